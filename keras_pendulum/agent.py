@@ -1,0 +1,102 @@
+"""The DQN agent: it selects actions and updates its network, and knows no environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import keras
+import numpy as np
+import tensorflow as tf
+from numpy.typing import NDArray
+
+from keras_pendulum.network import DQN
+from keras_pendulum.policy import GreedyPolicy
+from keras_pendulum.q_learning import mean_squared_error, td_target
+from keras_pendulum.randomness import RandomSource
+from keras_pendulum.replay import Transitions
+from keras_pendulum.target_network import TargetUpdate
+
+
+class Agent:
+    """ε-greedy behaviour and the update of Mnih et al. 2015, over networks handed in.
+
+    Args:
+        online: the network that acts and learns.
+        target: the network that values the next observations.
+        update_target: how `target` follows `online` after each update.
+        optimizer: a Keras optimizer for the online network.
+        discount: γ.
+        random: source of the exploration draws.
+    """
+
+    def __init__(
+        self,
+        online: DQN,
+        target: DQN,
+        update_target: TargetUpdate,
+        optimizer: keras.optimizers.Optimizer,
+        discount: float,
+        random: RandomSource,
+    ) -> None:
+        self.online = online
+        self.target = target
+        self.update_target = update_target
+        self.optimizer = optimizer
+        self.discount = discount
+        self.random = random
+        optimizer.build(online.trainable_variables)
+        self._compiled_updates = tf.function(self._updates, jit_compile=True)
+        self._greedy = GreedyPolicy(online)
+
+    def select_action(self, observation: NDArray[np.float32], epsilon: float) -> int:
+        """A random action index with probability ε, else the greedy one of observation [3]."""
+        if self.random.uniform() <= epsilon:
+            return self.random.action(self.online.action_count)
+        return self._greedy.action(observation)
+
+    def update(self, batches: Transitions) -> NDArray[np.float32]:
+        """Learns from batches [K, B, ...], one after the other; returns the losses [K].
+
+        One compiled call makes all K updates: a call each would cost three times as much.
+        """
+        losses = self._compiled_updates(Transitions(*map(tf.convert_to_tensor, batches)))
+        self._greedy = GreedyPolicy(self.online)
+        return losses.numpy()
+
+    def _updates(self, batches: Transitions) -> tf.Tensor:
+        count = batches.action.shape[0]
+        losses = tf.TensorArray(tf.float32, count)
+        for k in tf.range(count):
+            losses = losses.write(k, self.learn(Transitions(*(each[k] for each in batches))))
+        return losses.stack()  # [K]
+
+    def learn(self, batch: Transitions) -> tf.Tensor:
+        """One update from a batch [B, ...]; returns its loss, a scalar."""
+        next_q = self.target(batch.next_observation)  # [B, A]
+        target = td_target(batch.reward, batch.terminated, next_q, self.discount)  # [B]
+        with tf.GradientTape() as tape:
+            q = self.online(batch.observation)  # [B, A]
+            loss = mean_squared_error(q, batch.action, target)
+        variables = self.online.trainable_variables
+        gradients = tape.gradient(loss, variables)
+        self.optimizer.apply_gradients(zip(gradients, variables, strict=True))
+        self.update_target(self.online, self.target, self.optimizer.iterations)
+        return loss
+
+    def get_state(self) -> dict[str, list[NDArray[Any]]]:
+        """Copies of the target's weights and the optimizer's variables.
+
+        The online weights are not among them: they are the policy, kept by `weights`.
+        """
+        return {
+            "target": self.target.get_weights(),
+            "optimizer": [np.array(variable) for variable in self.optimizer.variables],
+        }
+
+    def set_state(self, online: list[NDArray[Any]], state: dict[str, list[NDArray[Any]]]) -> None:
+        """Goes on from online weights and a state of `get_state`."""
+        self.target.set_weights(state["target"])
+        self.online.set_weights(online)
+        for variable, value in zip(self.optimizer.variables, state["optimizer"], strict=True):
+            variable.assign(value)
+        self._greedy = GreedyPolicy(self.online)

@@ -1,0 +1,32 @@
+"""Keras runs on TensorFlow here, with the same arithmetic on every machine."""
+
+from __future__ import annotations
+
+import os
+
+from keras_pendulum.errors import UserError
+
+_ENVIRONMENT = {
+    # How many threads share a matrix product decides how its sums are rounded, and one rounded
+    # digit can part two runs: with one thread a run does not depend on the number of cores.
+    "TF_NUM_INTRAOP_THREADS": "1",
+    # oneDNN picks its kernels by the processor and rounds differently with each.
+    "TF_ENABLE_ONEDNN_OPTS": "0",
+    "TF_CPP_MIN_LOG_LEVEL": "3",  # its start-up notes help nobody here
+}
+
+
+def require_tensorflow() -> None:
+    """Prepares the process for TensorFlow; to be called before Keras is imported.
+
+    What the user has set in the environment stays.
+
+    Raises UserError when Keras was asked to run on another backend.
+    """
+    backend = os.environ.setdefault("KERAS_BACKEND", "tensorflow")
+    if backend != "tensorflow":
+        raise UserError(
+            f"KERAS_BACKEND is {backend!r}, but this package runs on TensorFlow: unset it"
+        )
+    for name, value in _ENVIRONMENT.items():
+        os.environ.setdefault(name, value)

@@ -1,0 +1,119 @@
+"""A run's whole state in its `.h5`: the weights as Keras loads them, the rest in extra groups."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, fields
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum import layer_files
+from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.episodes import EpisodeRecord
+from keras_pendulum.errors import ConfigError, WeightsError
+from keras_pendulum.presets import Config
+from keras_pendulum.run import Run
+from keras_pendulum.weights import weights_file
+
+# A resumed run may be made longer or saved at other times; anything else would be another run.
+_MAY_CHANGE = {"episodes", "save_every"}
+
+
+def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
+    """Writes the run as it stands between two episodes.
+
+    Raises UserError when the file cannot be written; an old checkpoint is then unharmed.
+    """
+    agent = run.agent.get_state()
+    state = {
+        "config": asdict(run.config),
+        "random": run.random.get_state(),
+        "environment": run.env.unwrapped.np_random.bit_generator.state,
+        "replay_added": run.replay.added,
+    }
+    history = np.array(run.history, np.float64).reshape(-1, len(EpisodeRecord._fields))
+    content = weights_file(
+        run.agent.online,
+        target=_numbered(agent["target"]),
+        optimizer=_numbered(agent["optimizer"]),
+        replay=run.replay.get_state(),
+        # JSON as bytes: HDF5's own strings are pointers into a heap that no reader can bound.
+        run={"state": np.frombuffer(json.dumps(state).encode(), np.uint8), "history": history},
+    )
+    write_atomically(path, content)
+
+
+def load_config(path: str | os.PathLike[str]) -> Config:
+    """The settings of the run in a checkpoint. Raises as `load_checkpoint` does."""
+    with layer_files.opened(path) as file:
+        return _config(_state(file, path), path)
+
+
+def load_checkpoint(path: str | os.PathLike[str], config: Config) -> Run:
+    """The run in a checkpoint, ready to go on.
+
+    Args:
+        path: the checkpoint.
+        config: the run's settings; only `episodes` and `save_every` may differ from the file's.
+
+    Raises:
+        WeightsError: the file is damaged or holds weights alone.
+        ConfigError: `config` is that of another run.
+    """
+    with layer_files.opened(path) as file:
+        state = _state(file, path)
+        stored = _config(state, path)
+        for spec in fields(Config):
+            ours, theirs = getattr(config, spec.name), getattr(stored, spec.name)
+            if ours != theirs and spec.name not in _MAY_CHANGE:
+                raise ConfigError(
+                    f"{path}: this run has {spec.name} {theirs}, not {ours}: resume it without "
+                    "changing that, or start another run in another folder"
+                )
+        run = Run(config)
+        online = layer_files.read_layers(file, path, run.agent.online.observation_size)
+        agent = {name: list(_arrays(file, name, path).values()) for name in ("target", "optimizer")}
+        run.agent.set_state(online, agent)
+        run.replay.set_state(_arrays(file, "replay", path), state["replay_added"])
+        run.random.set_state(state["random"])
+        run.env.unwrapped.np_random.bit_generator.state = state["environment"]
+        rows = layer_files.read_array(file["run/history"], path, finite=False)
+        run.history = [_record(row) for row in rows]
+    return run
+
+
+def _config(state: dict[str, Any], path: str | os.PathLike[str]) -> Config:
+    values = state["config"]
+    try:
+        return Config(**{**values, "hidden_units": tuple(values["hidden_units"])})
+    except (TypeError, ConfigError) as error:
+        raise WeightsError(f"{path}: records settings that no run can have ({error})") from error
+
+
+def _state(file: h5py.File, path: str | os.PathLike[str]) -> dict[str, Any]:
+    if "run" not in file:
+        raise WeightsError(
+            f"{path}: holds weights alone, no run to resume: use --init to start one"
+        )
+    text = layer_files.read_array(file["run/state"], path).tobytes()
+    state: dict[str, Any] = json.loads(text)
+    return state
+
+
+def _arrays(file: h5py.File, group: str, path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+    return {name: layer_files.read_array(entry, path) for name, entry in file[group].items()}
+
+
+def _numbered(arrays: list[NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    # Zero-padded, because HDF5 lists names in the order of their letters.
+    return {f"{i:03}": array for i, array in enumerate(arrays)}
+
+
+def _record(row: NDArray[np.float64]) -> EpisodeRecord:
+    whole = {"episode", "environment_steps", "updates"}
+    values = zip(EpisodeRecord._fields, row.tolist(), strict=True)
+    return EpisodeRecord(**{name: int(value) if name in whole else value for name, value in values})

@@ -1,0 +1,74 @@
+"""What the commands share: flags made from the Config, and errors told in one line."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import Any, NoReturn
+
+from keras_pendulum.errors import UserError
+from keras_pendulum.presets import Config
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Tells a wrong flag in one line, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leaves with exit status 2."""
+        self.exit(2, f"error: {message}\n")
+
+
+def run_command(command: Callable[[], int]) -> int:
+    """Calls `command`; a user's mistake becomes one line on stderr and exit status 2."""
+    try:
+        return command()
+    except UserError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone; Python would complain once more when it flushes.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def add_config_flags(parser: argparse.ArgumentParser, skip: Sequence[str] = ()) -> None:
+    """One flag for each field of Config, unset unless it is typed."""
+    group = parser.add_argument_group("settings (the defaults are those of the preset)")
+    for spec in fields(Config):
+        if spec.name not in skip:
+            group.add_argument(
+                f"--{spec.name.replace('_', '-')}",
+                type=_READERS[str(spec.type)],
+                choices=spec.metadata["choices"],
+                default=argparse.SUPPRESS,
+                metavar=None if spec.metadata["choices"] else "N",
+                help=f"{spec.metadata['meaning']} [reference: {_shown(spec.default)}]",
+            )
+
+
+def typed_settings(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The settings that were typed, by field name; the preset is not one of them."""
+    names = {spec.name for spec in fields(Config)} - {"preset"}
+    return {name: value for name, value in vars(arguments).items() if name in names}
+
+
+def _whole_numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
+
+
+_whole_numbers.__name__ = "list of whole numbers"  # what argparse calls it in its message
+_READERS: dict[str, Callable[[str], Any]] = {
+    "int": int,
+    "float": float,
+    "str": str,
+    "tuple[int, ...]": _whole_numbers,
+}
+
+
+def _shown(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -1,0 +1,82 @@
+"""The command `python -m keras_pendulum.evaluate`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from keras_pendulum.backend import require_tensorflow
+from keras_pendulum.command_line import OneLineParser, run_command
+
+if TYPE_CHECKING:
+    from keras_pendulum.network import DQN
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Parses the command line and evaluates; returns the exit status."""
+    parser = OneLineParser(
+        prog="python -m keras_pendulum.evaluate",
+        description="Tell how good the policy in a weights file is, beside the best possible one.",
+    )
+    parser.add_argument("weights", metavar="WEIGHTS.h5", help="a file, or a shipped one by name")
+    parser.add_argument("--episodes", type=int, default=100, metavar="N", help="how many [100]")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the first start; i is added [0]"
+    )
+    parser.add_argument(
+        "--gravity", type=float, metavar="G", help="m/s² [what the file records, else 1]"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead")
+    parser.add_argument("--render", action="store_true", help="show the episodes in a window")
+    parser.add_argument("--gif", metavar="FILE", help="film the first episode")
+    arguments = parser.parse_args(argv)
+    return run_command(lambda: _evaluate(arguments))
+
+
+def _evaluate(arguments: argparse.Namespace) -> int:
+    require_tensorflow()
+
+    from keras_pendulum.evaluation import evaluate_policy
+    from keras_pendulum.weights import find_weights, load_weights
+
+    path = find_weights(arguments.weights)
+    network = load_weights(path)
+    score = evaluate_policy(
+        network,
+        arguments.episodes,
+        arguments.seed,
+        gravity=arguments.gravity,
+        render_mode="human" if arguments.render else None,
+    )
+    if arguments.gif:
+        _film(network, arguments.seed, score.gravity, arguments.gif)
+    if arguments.json:
+        print(json.dumps({"weights": str(path), **score.as_json()}))
+    else:
+        print(score.summary())
+    return 0
+
+
+def _film(network: DQN, seed: int, gravity: float, path: str) -> None:
+    """Writes a GIF of the first episode, every second frame of it."""
+    from keras_pendulum import pictures
+    from keras_pendulum.atomic_file import write_atomically
+    from keras_pendulum.evaluation import evaluate_policy
+
+    frames: list[Any] = []
+    evaluate_policy(
+        network,
+        1,
+        seed,
+        gravity=gravity,
+        render_mode="rgb_array",
+        on_step=lambda env: frames.append(env.render()),
+    )
+    write_atomically(path, pictures.gif(frames[::2], seconds_per_frame=0.1))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

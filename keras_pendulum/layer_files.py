@@ -1,0 +1,190 @@
+"""The layers of a feed-forward network inside an HDF5 file: found, checked, read, written.
+
+Keras loads a wrong file half-way, or silently wrong. Here every array is checked before it is
+read: float, of a believable size, stored plainly in the file itself, finite, and in a chain in
+which each layer takes what the one before gives.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.errors import WeightsError
+
+_LARGEST_FILE = 2**30  # bytes; the largest checkpoint of a preset has 6 MB
+_LARGEST_LAYER = 8192  # units
+_Layer = tuple[str, list[Any]]  # its name and its datasets, kernel and bias
+
+
+@contextlib.contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
+    """The HDF5 file at `path`, open for reading.
+
+    Raises:
+        WeightsError: missing, a folder, empty, not HDF5, truncated or otherwise damaged, also
+            where the damage shows only inside the `with` block.
+    """
+    file = Path(path)
+    try:
+        if not file.exists():
+            raise WeightsError(f"{path}: no such file; expected a weights file (.h5)")
+        if not file.is_file():
+            raise WeightsError(f"{path}: not a file; expected a weights file (.h5)")
+        with open(file, "rb") as stream:
+            head = stream.read(8)
+        if not head:
+            raise WeightsError(f"{path}: the file is empty; expected a weights file (.h5)")
+        if head != b"\x89HDF\r\n\x1a\n":
+            raise WeightsError(f"{path}: not an HDF5 file; expected a weights file (.h5)")
+        if file.stat().st_size > _LARGEST_FILE:
+            raise WeightsError(f"{path}: larger than 1 GiB; no network here is")
+        with h5py.File(file, "r") as content:
+            yield content
+    # h5py tells of damage with whatever its C library met.
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+        if isinstance(error, WeightsError):
+            raise
+        reason = re.sub(r"\s+", " ", str(error)).strip()
+        raise WeightsError(f"{path}: cannot be read, the file is damaged ({reason})") from error
+
+
+def read_layers(
+    file: h5py.File, path: str | os.PathLike[str], inputs: int
+) -> list[NDArray[np.float32]]:
+    """Kernel [in, out] and bias [out] of each layer, in order from the first, with `inputs`, on.
+
+    Raises:
+        WeightsError: there are none, or they are not those of a chain of Dense layers.
+    """
+    root = file.get("model_weights", file)  # a whole Keras 2 model keeps its weights one deeper
+    named = _keras2_layers(root) if "layer_names" in root.attrs else _keras3_layers(root, inputs)
+    if not named:
+        raise WeightsError(f"{path}: holds no network weights in a layout of Keras 2 or Keras 3")
+    arrays: list[NDArray[np.float32]] = []
+    width = inputs
+    for name, datasets in named:
+        if len(datasets) != 2:
+            raise WeightsError(
+                f"{path}: layer {name} has {len(datasets)} arrays; expected kernel and bias"
+            )
+        kernel, bias = (read_array(dataset, path) for dataset in datasets)
+        if kernel.ndim != 2 or bias.shape != kernel.shape[1:]:
+            raise WeightsError(
+                f"{path}: layer {name} has shapes {kernel.shape} and {bias.shape}; "
+                "expected a kernel [in, out] and a bias [out]"
+            )
+        if not 1 <= kernel.shape[1] <= _LARGEST_LAYER:
+            raise WeightsError(
+                f"{path}: layer {name} has {kernel.shape[1]} units; expected 1 to {_LARGEST_LAYER}"
+            )
+        if kernel.shape[0] != width:
+            raise WeightsError(
+                f"{path}: layer {name} takes {kernel.shape[0]} inputs; expected {width}, as many "
+                "as there are before it"
+            )
+        width = kernel.shape[1]
+        arrays += [kernel.astype(np.float32), bias.astype(np.float32)]
+    return arrays
+
+
+def read_array(dataset: Any, path: str | os.PathLike[str], *, finite: bool = True) -> NDArray[Any]:
+    """The numbers of a dataset, checked before and (where they must be `finite`) after reading.
+
+    Raises:
+        WeightsError: not numbers, not stored plainly in this file, or not finite.
+    """
+    if not isinstance(dataset, h5py.Dataset):
+        raise WeightsError(f"{path}: {dataset.name} is not an array")
+    plain = (
+        dataset.chunks is None
+        and not dataset.external
+        and not dataset.is_virtual
+        and dataset.dtype.kind in "fiub"
+        and dataset.id.get_storage_size() == dataset.nbytes
+    )
+    if not plain:
+        raise WeightsError(
+            f"{path}: {dataset.name} ({dataset.dtype}, {dataset.shape}) is not a plain array of "
+            "numbers stored whole in this file"
+        )
+    array: NDArray[Any] = dataset[()]
+    if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise WeightsError(f"{path}: {dataset.name} holds NaN or infinite numbers")
+    return array
+
+
+def write_layers(file: h5py.File, arrays: list[NDArray[np.float32]]) -> None:
+    """Writes kernel, bias, kernel, bias, … in the layout of Keras 2's `save_weights`."""
+    names = ["dense" if i == 0 else f"dense_{i}" for i in range(len(arrays) // 2)]
+    file.attrs["backend"] = b"tensorflow"
+    file.attrs["keras_version"] = b"2.15.0"  # the version whose layout this is
+    file.attrs["layer_names"] = np.array(names, "S")
+    for name, kernel, bias in zip(names, arrays[::2], arrays[1::2], strict=True):
+        group = file.create_group(name)
+        parts = {f"{name}/kernel:0": kernel, f"{name}/bias:0": bias}
+        group.attrs["weight_names"] = np.array(list(parts), "S")
+        for part, array in parts.items():
+            group.create_dataset(part, data=array)
+    file.create_group("top_level_model_weights").attrs["weight_names"] = np.array([], "S1")
+
+
+def _keras2_layers(root: h5py.Group) -> list[_Layer]:
+    """Layers with weights, in the file's own order."""
+    layers = []
+    for name in map(_text, root.attrs["layer_names"]):
+        group = root[name]
+        datasets = [group[_text(part)] for part in group.attrs["weight_names"]]
+        if datasets:  # Flatten, Dropout and the like have none
+            layers.append((name, datasets))
+    return layers
+
+
+def _keras3_layers(root: h5py.Group, inputs: int) -> list[_Layer]:
+    """Layers with weights, put in order: the file keeps them by attribute name instead."""
+    layers: dict[str, _Layer] = {}
+
+    def collect(path: str, entry: Any) -> None:
+        *parents, last = path.split("/")
+        if last == "vars" and parents[:1] != ["optimizer"] and len(entry):
+            # The layer's own name, dense_3, counts the layers as they were made.
+            name = _text(entry.attrs.get("name", "/".join(parents)))
+            layers[path] = (name, [entry[key] for key in sorted(entry, key=_natural)])
+
+    root.visititems(collect)
+    by_number = sorted(layers.values(), key=lambda layer: _natural(layer[0]))
+    if len({re.sub(r"\d*$", "", name).rstrip("_") for name, _ in by_number}) == 1:
+        return by_number
+    return _ordered_by_width(by_number, inputs)
+
+
+def _ordered_by_width(layers: list[_Layer], inputs: int) -> list[_Layer]:
+    """The layers in the one order in which each takes as many inputs as the last one gives."""
+    ordered: list[_Layer] = []
+    remaining = list(layers)
+    shape: tuple[int, ...] = (inputs,)
+    while remaining:
+        following = [layer for layer in remaining if layer[1][0].shape[:1] == shape[-1:]]
+        if len(following) != 1:
+            raise ValueError(f"the order of its layers {[name for name, _ in layers]} is unclear")
+        ordered += following
+        remaining.remove(following[0])
+        shape = following[0][1][0].shape
+    return ordered
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    """Sort key by which dense_2 comes before dense_10, and dense before both."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _text(name: Any) -> str:
+    return name.decode() if isinstance(name, bytes) else str(name)

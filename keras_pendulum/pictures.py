@@ -1,0 +1,70 @@
+"""Figures of a run and films of a policy."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.environment import STEPS_PER_EPISODE
+from keras_pendulum.episodes import EpisodeRecord
+
+_MEAN_OVER = 10  # episodes
+
+
+def learning_curve(
+    history: Sequence[EpisodeRecord], best_return: float, random_return: float
+) -> bytes:
+    """The original's plot, episode against average reward a step, between chance and the best.
+
+    Args:
+        history: at least one record.
+        best_return: best possible mean return of an episode.
+        random_return: mean return of uniformly random torques.
+
+    Returns:
+        A PNG file's bytes.
+    """
+    from matplotlib.figure import Figure
+
+    episodes = np.array([record.episode for record in history])
+    rewards = np.array([record.average_reward for record in history])
+    figure = Figure(figsize=(8, 4.5), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(episodes, rewards, ".", color="0.65", markersize=4, label="episode")
+    if len(rewards) >= _MEAN_OVER:
+        mean = np.convolve(rewards, np.ones(_MEAN_OVER) / _MEAN_OVER, "valid")
+        label = f"mean of {_MEAN_OVER} episodes"
+        axes.plot(episodes[_MEAN_OVER - 1 :], mean, color="#0072B2", linewidth=2, label=label)
+    axes.axhline(
+        best_return / STEPS_PER_EPISODE, color="black", linestyle="--", label="best possible"
+    )
+    axes.axhline(
+        random_return / STEPS_PER_EPISODE, color="#D55E00", linestyle=":", label="random torque"
+    )
+    axes.set_xlabel("Episode")
+    axes.set_ylabel("Average reward per step")
+    axes.legend(loc="lower right")
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=120)
+    return stream.getvalue()
+
+
+def gif(frames: Sequence[NDArray[np.uint8]], seconds_per_frame: float, size: int = 250) -> bytes:
+    """An endless GIF of RGB frames [H, W, 3], scaled to `size` pixels a side."""
+    from PIL import Image
+
+    images: list[Any] = [Image.fromarray(frame).resize((size, size)) for frame in frames]
+    stream = io.BytesIO()
+    images[0].save(
+        stream,
+        format="GIF",
+        save_all=True,
+        append_images=images[1:],
+        duration=round(1000 * seconds_per_frame),
+        loop=0,
+    )
+    return stream.getvalue()

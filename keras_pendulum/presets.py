@@ -1,0 +1,168 @@
+"""Every number of a run, with its unit and source; the presets are values of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from keras_pendulum.errors import ConfigError
+
+
+def _setting(
+    default: Any,
+    meaning: str,
+    *,
+    low: float | None = None,
+    high: float | None = None,
+    choices: tuple[str, ...] | None = None,
+) -> Any:
+    return field(
+        default=default,
+        metadata={"meaning": meaning, "low": low, "high": high, "choices": choices},
+    )
+
+
+@dataclass(frozen=True)
+class Config:
+    """The settings of one run. The defaults are the preset `reference`.
+
+    Raises ConfigError, naming the field, for a value outside its range.
+    """
+
+    preset: str = _setting("reference", "name of the preset these settings started from")
+    environment: str = _setting("Pendulum-v1", "Gymnasium's name", choices=("Pendulum-v1",))
+    gravity: float = _setting(
+        1.0, "gravity in m/s² (Gymnasium's own default is 10; the original uses 1)", low=0, high=100
+    )
+    episodes: int = _setting(500, "episodes of 200 steps (original: 500)", low=1, high=1_000_000)
+    seed: int = _setting(0, "seed of every random draw of the run", low=0, high=2**32 - 1)
+    hidden_units: tuple[int, ...] = _setting(
+        (512, 256, 128), "widths of the tanh layers, comma-separated", low=1, high=8192
+    )
+    torque_count: int = _setting(
+        41, "torques, evenly spaced from -2 to 2 N·m (original: linspace)", low=2, high=1001
+    )
+    replay_capacity: int = _setting(
+        50_000, "transitions remembered (original: 8000)", low=1, high=10_000_000
+    )
+    batch_size: int = _setting(
+        32, "transitions in an update, drawn without replacement", low=1, high=65_536
+    )
+    discount: float = _setting(0.9, "discount γ a step (original: 0.9)", low=0, high=1)
+    epsilon_start: float = _setting(
+        0.9, "ε before the first decay: share of random torques", low=0, high=1
+    )
+    epsilon_decay: float = _setting(0.99, "factor on ε before each episode", low=0, high=1)
+    epsilon_min: float = _setting(0.01, "ε never falls below this", low=0, high=1)
+    learning_starts: int = _setting(
+        40, "updates follow each episode with a higher number than this", low=0, high=1_000_000
+    )
+    updates_per_episode: int = _setting(
+        30,
+        "gradient updates after an episode (original: 1, `update-starvation`)",
+        low=1,
+        high=10_000,
+    )
+    learning_rate: float = _setting(1e-3, "Adam's first step size", low=1e-9, high=10)
+    learning_rate_schedule: str = _setting(
+        "cosine",
+        "constant (original), or a cosine from the first step size to 0 at the last update",
+        choices=("constant", "cosine"),
+    )
+    target_update: str = _setting(
+        "soft",
+        "how the target network follows: soft (Lillicrap et al. 2016), hard (Mnih et al. 2015), "
+        "or none (original, `no-target-network`: the online network is its own target)",
+        choices=("soft", "hard", "none"),
+    )
+    target_blend: float = _setting(
+        0.01, "soft: share of the online weights blended in after each update", low=0, high=1
+    )
+    target_period: int = _setting(
+        200, "hard: updates from one copy to the next", low=1, high=1_000_000
+    )
+    remembered_action: str = _setting(
+        "index",
+        "what the replay buffer keeps: the index, or the index got back from the torque by "
+        "truncation (walkthrough, `index-truncation`)",
+        choices=("index", "truncated"),
+    )
+    save_every: int = _setting(
+        10, "episodes from one checkpoint to the next", low=1, high=1_000_000
+    )
+
+    def __post_init__(self) -> None:
+        for spec in fields(self):
+            _check(spec.name, getattr(self, spec.name), spec.metadata)
+        if self.batch_size > self.replay_capacity:
+            raise ConfigError(
+                f"batch_size {self.batch_size} is larger than replay_capacity "
+                f"{self.replay_capacity}: no batch could ever be drawn"
+            )
+        if self.remembered_action == "truncated" and self.torque_count != 41:
+            raise ConfigError(
+                "remembered_action 'truncated' belongs to the walkthrough's 41 torques, "
+                f"not to torque_count {self.torque_count}"
+            )
+
+    @property
+    def total_updates(self) -> int:
+        """Updates that the whole run makes."""
+        return max(0, self.episodes - self.learning_starts - 1) * self.updates_per_episode
+
+
+def _check(name: str, value: Any, rule: Any) -> None:
+    if rule["choices"] is not None and value not in rule["choices"]:
+        raise ConfigError(f"{name} is {value!r}; expected one of {', '.join(rule['choices'])}")
+    if rule["low"] is None:
+        return
+    numbers = value if isinstance(value, tuple) else (value,)
+    if not 1 <= len(numbers) <= 16:
+        raise ConfigError(f"{name} has {len(numbers)} entries; expected 1 to 16")
+    for number in numbers:
+        if isinstance(number, bool) or not math.isfinite(number):
+            raise ConfigError(f"{name} is {number}; expected a finite number")
+        if not rule["low"] <= number <= rule["high"]:
+            raise ConfigError(
+                f"{name} is {number}; expected a number from {rule['low']} to {rule['high']}"
+            )
+
+
+_REFERENCE = Config()
+# The final listing of the inverted-pendulum page (July 2023), to the last printed line.
+_ORIGINAL = replace(
+    _REFERENCE,
+    preset="original",
+    replay_capacity=8000,
+    updates_per_episode=1,
+    learning_rate_schedule="constant",
+    target_update="none",
+)
+# The step-by-step listing on the same page, its runnable block.
+_WALKTHROUGH = replace(
+    _ORIGINAL,
+    preset="walkthrough",
+    episodes=400,
+    hidden_units=(128, 64, 32),
+    replay_capacity=4000,
+    batch_size=64,
+    remembered_action="truncated",
+)
+
+PRESETS: dict[str, Config] = {
+    config.preset: config for config in (_REFERENCE, _ORIGINAL, _WALKTHROUGH)
+}
+
+
+def preset(name: str = "reference", **changes: Any) -> Config:
+    """The preset `name`, with single settings changed.
+
+    Raises ConfigError for an unknown preset, an unknown setting, or a value out of range.
+    """
+    if name not in PRESETS:
+        raise ConfigError(f"unknown preset {name!r}; expected one of {', '.join(PRESETS)}")
+    unknown = changes.keys() - {spec.name for spec in fields(Config)}
+    if unknown:
+        raise ConfigError(f"unknown setting {', '.join(sorted(unknown))}")
+    return replace(PRESETS[name], **changes)

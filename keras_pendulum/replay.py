@@ -1,0 +1,85 @@
+"""The replay buffer: the last transitions, in ring arrays."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class Transitions(NamedTuple):
+    """Transitions of any leading shape [...]: a batch [B], or the batches of an episode [K, B].
+
+    Arrays from the buffer, tensors inside the update.
+    """
+
+    observation: Any  # [..., 3] float32
+    action: Any  # [...] int32, the index of the torque
+    reward: Any  # [...] float32
+    next_observation: Any  # [..., 3] float32
+    terminated: Any  # [...] bool, true where no value follows; truncation is not termination
+
+
+class ReplayBuffer:
+    """Holds the last `capacity` transitions (Mnih et al. 2015, Methods)."""
+
+    def __init__(self, capacity: int, observation_size: int = 3) -> None:
+        self.capacity = capacity
+        self._added = 0
+        self._arrays = Transitions(
+            observation=np.zeros((capacity, observation_size), np.float32),
+            action=np.zeros(capacity, np.int32),
+            reward=np.zeros(capacity, np.float32),
+            next_observation=np.zeros((capacity, observation_size), np.float32),
+            terminated=np.zeros(capacity, bool),
+        )
+
+    def __len__(self) -> int:
+        return min(self._added, self.capacity)
+
+    def add(
+        self,
+        observation: ArrayLike,
+        action: int,
+        reward: float,
+        next_observation: ArrayLike,
+        terminated: bool,
+    ) -> None:
+        """Stores one transition, in the place of the oldest when the buffer is full."""
+        slot = self._added % self.capacity
+        arrays = self._arrays
+        arrays.observation[slot] = observation
+        arrays.action[slot] = action
+        arrays.reward[slot] = reward
+        arrays.next_observation[slot] = next_observation
+        arrays.terminated[slot] = terminated
+        self._added += 1
+
+    def at(self, positions: ArrayLike) -> Transitions:
+        """The transitions at `positions` [...], counted from the oldest (0) on.
+
+        Raises IndexError for a position that holds none.
+        """
+        wanted: NDArray[np.int64] = np.asarray(positions, np.int64)
+        if wanted.size and not 0 <= wanted.min() <= wanted.max() < len(self):
+            raise IndexError(f"position outside the {len(self)} stored transitions")
+        slots = (self._added - len(self) + wanted) % self.capacity
+        return Transitions(*(array[slots] for array in self._arrays))
+
+    def get_state(self) -> dict[str, NDArray[Any]]:
+        """All stored transitions, oldest first, one array a field."""
+        return self.at(np.arange(len(self)))._asdict()
+
+    def set_state(self, state: dict[str, NDArray[Any]], added: int) -> None:
+        """Takes the transitions of `get_state`; `added` is how many were ever added."""
+        stored = len(state["action"])
+        self._added = added
+        slots = (added - stored + np.arange(stored)) % self.capacity
+        for name, array in self._arrays._asdict().items():
+            array[slots] = state[name]
+
+    @property
+    def added(self) -> int:
+        """Transitions added since the start of the run."""
+        return self._added

@@ -1,0 +1,72 @@
+"""The folder of a run: its checkpoint, history, settings and picture."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.episodes import EpisodeRecord
+from keras_pendulum.errors import UserError
+from keras_pendulum.presets import Config
+
+_COLUMNS = ["return" if name == "episode_return" else name for name in EpisodeRecord._fields]
+
+
+class RunFolder:
+    """Names the files of a run and writes the plain-text ones."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self.weights = self.path / "pendulum_weight.h5"
+        self.history = self.path / "history.csv"
+        self.config = self.path / "config.json"
+        self.picture = self.path / "rewards.png"
+
+    @property
+    def files(self) -> list[Path]:
+        """Every file that a run leaves here."""
+        return [self.weights, self.history, self.config, self.picture]
+
+    def claim(self, overwrite: bool) -> None:
+        """Makes the folder ready for a new run.
+
+        Raises:
+            UserError: it holds a run already and `overwrite` is false, or it cannot be made.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
+        used = [file.name for file in self.files if file.exists()]
+        if used and not overwrite:
+            raise UserError(
+                f"{self.path} already holds a run ({', '.join(used)}): go on with it by --resume, "
+                "replace it by --overwrite, or name another folder by --out"
+            )
+
+    def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
+        """Writes the settings, and the history of the episodes before a resumed run goes on.
+
+        Raises UserError when the folder cannot be written.
+        """
+        write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
+        lines = [",".join(_COLUMNS), *map(_row, history)]
+        write_atomically(self.history, "".join(line + "\n" for line in lines).encode())
+
+    def append(self, record: EpisodeRecord) -> None:
+        """Adds a row to the history. Raises UserError when it cannot be written."""
+        try:
+            with open(self.history, "a", encoding="ascii") as file:
+                file.write(_row(record) + "\n")
+        except OSError as error:
+            raise UserError(f"cannot write {self.history}: {error.strerror}") from error
+
+
+def _row(record: EpisodeRecord) -> str:
+    # A missing loss is an empty cell, which pandas reads as NaN.
+    return ",".join("" if math.isnan(value) else repr(value) for value in record)

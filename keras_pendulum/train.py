@@ -1,0 +1,141 @@
+"""The command `python -m keras_pendulum.train`."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from keras_pendulum.backend import require_tensorflow
+from keras_pendulum.command_line import (
+    OneLineParser,
+    add_config_flags,
+    run_command,
+    typed_settings,
+)
+from keras_pendulum.errors import UserError
+from keras_pendulum.presets import PRESETS, Config, preset
+
+if TYPE_CHECKING:
+    from keras_pendulum.episodes import EpisodeRecord
+    from keras_pendulum.run_folder import RunFolder
+    from keras_pendulum.training import TrainingResult
+
+_EVALUATION_EPISODES = 100
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Parses the command line and trains; returns the exit status."""
+    parser = OneLineParser(
+        prog="python -m keras_pendulum.train",
+        description="Train a DQN to hold a pendulum up, and say how good it has become.",
+        epilog="Ctrl-C saves a checkpoint; --resume goes on from it.",
+    )
+    parser.add_argument("--preset", default=None, help=f"{', '.join(PRESETS)} [reference]")
+    parser.add_argument("--init", metavar="FILE.h5", help="start from these weights")
+    parser.add_argument("--out", metavar="DIR", help="folder of the run [runs/PRESET-seedN]")
+    rerun = parser.add_mutually_exclusive_group()
+    rerun.add_argument("--resume", action="store_true", help="go on from DIR's last checkpoint")
+    rerun.add_argument("--overwrite", action="store_true", help="replace the run that DIR holds")
+    add_config_flags(parser, skip=["preset"])
+    arguments = parser.parse_args(argv)
+    return run_command(lambda: _train(arguments))
+
+
+def _train(arguments: argparse.Namespace) -> int:
+    settings = typed_settings(arguments)
+    config = preset(arguments.preset or "reference", **settings)
+    out = Path(arguments.out or Path("runs") / f"{config.preset}-seed{config.seed}")
+    if arguments.resume and arguments.init:
+        raise UserError("--init starts a new run, --resume goes on with one: give one of them")
+    require_tensorflow()
+
+    from keras_pendulum.checkpoint import load_config
+    from keras_pendulum.run_folder import RunFolder
+    from keras_pendulum.training import train_dqn
+    from keras_pendulum.weights import find_weights, load_weights
+
+    if arguments.resume:
+        if arguments.preset:
+            settings["preset"] = arguments.preset
+        config = replace(load_config(RunFolder(out).weights), **settings)
+    init = load_weights(find_weights(arguments.init)) if arguments.init else None
+
+    started = time.perf_counter()
+    with _interrupt_asks_to_stop() as interrupted:
+        result = train_dqn(
+            config,
+            out,
+            init=init,
+            overwrite=arguments.overwrite,
+            resume=arguments.resume,
+            listeners=[_progress(config)],
+            should_stop=interrupted.is_set,
+        )
+    _print_summary(result, RunFolder(out), time.perf_counter() - started)
+    return 0 if result.finished else 130
+
+
+@contextlib.contextmanager
+def _interrupt_asks_to_stop() -> Iterator[threading.Event]:
+    """The first Ctrl-C sets the event, so that the episode ends in order; the second one kills."""
+    asked = threading.Event()
+
+    def ask(signum: int, frame: object) -> None:
+        asked.set()
+        signal.signal(signal.SIGINT, before)
+
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _progress(config: Config) -> Callable[[EpisodeRecord], None]:
+    """A bar on a terminal; elsewhere the original's line for each episode."""
+    if not sys.stdout.isatty():
+        return lambda record: print(record.line(), flush=True)
+    import keras
+
+    bar = keras.utils.Progbar(
+        config.episodes, unit_name="episode", stateful_metrics=["return", "epsilon", "loss"]
+    )
+
+    def show(record: EpisodeRecord) -> None:
+        values = [("return", record.episode_return), ("epsilon", record.epsilon)]
+        if not math.isnan(record.loss):
+            values.append(("loss", record.loss))
+        bar.update(record.episode + 1, values)
+
+    return show
+
+
+def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) -> None:
+    from keras_pendulum.evaluation import evaluate_policy
+
+    last = result.history[-1]
+    state = "Trained" if result.finished else "Interrupted after"
+    print(
+        f"{state} {last.episode + 1} episodes ({last.environment_steps} steps, {last.updates} "
+        f"updates); this took {seconds:.1f} s."
+    )
+    if result.finished:
+        score = evaluate_policy(result.network, _EVALUATION_EPISODES)
+        print(score.summary())
+    saved = ", ".join(file.name for file in folder.files if file.exists())
+    print(f"Saved in {folder.path}: {saved}")
+    if not result.finished:
+        print(f"Go on: python -m keras_pendulum.train --resume --out {folder.path}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,98 @@
+"""A run from its first episode to its last, with what is kept of it on the way."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from keras_pendulum import pictures
+from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.checkpoint import load_checkpoint, save_checkpoint
+from keras_pendulum.episodes import EpisodeRecord
+from keras_pendulum.errors import UserError
+from keras_pendulum.evaluation import random_return
+from keras_pendulum.network import DQN
+from keras_pendulum.optimum import optimal_return
+from keras_pendulum.presets import Config
+from keras_pendulum.run import Run
+from keras_pendulum.run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """What a run leaves: the trained network and a record for each episode."""
+
+    network: DQN
+    history: list[EpisodeRecord]
+    finished: bool  # false when it was stopped before its last episode
+
+
+def train_dqn(
+    config: Config,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    init: DQN | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    listeners: Iterable[Callable[[EpisodeRecord], None]] = (),
+    should_stop: Callable[[], bool] = lambda: False,
+) -> TrainingResult:
+    """Trains a DQN.
+
+    Args:
+        config: the settings; `preset` gives them.
+        out: a folder for checkpoint, history, settings and picture; None keeps nothing.
+        init: a network whose weights to start from.
+        overwrite: replace a run that `out` already holds.
+        resume: go on from the checkpoint in `out`; `config` may only change `episodes` and
+            `save_every`.
+        listeners: called with the record of each episode.
+        should_stop: asked after each episode; true ends the run there, with a checkpoint.
+
+    Raises:
+        ConfigError: settings and `init`, or settings and checkpoint, do not fit.
+        WeightsError: the checkpoint to resume from is damaged.
+        UserError: `out` is in use or cannot be written, or the loss is no longer finite.
+    """
+    folder = None if out is None else RunFolder(out)
+    if resume:
+        if folder is None:
+            raise UserError("resume needs the folder of the run to go on with")
+        run = load_checkpoint(folder.weights, config)
+    else:
+        run = Run(config, init)
+        if folder is not None:
+            folder.claim(overwrite)
+    if folder is not None:
+        folder.begin(config, run.history)
+    finished = True
+    for record in run.episodes():
+        _check_learning(record, config)
+        if folder is not None:
+            folder.append(record)
+            if record.episode % config.save_every == 0:
+                save_checkpoint(run, folder.weights)
+        for listener in listeners:
+            listener(record)
+        if should_stop() and record.episode + 1 < config.episodes:
+            finished = False
+            break
+    if folder is not None:
+        save_checkpoint(run, folder.weights)
+        if finished:
+            best = float(optimal_return(config.gravity, range(1000)).mean())
+            chance = random_return(config.environment, config.gravity)
+            write_atomically(folder.picture, pictures.learning_curve(run.history, best, chance))
+    return TrainingResult(run.agent.online, run.history, finished)
+
+
+def _check_learning(record: EpisodeRecord, config: Config) -> None:
+    """Stops a run that has diverged before its checkpoint replaces a good one."""
+    learned = record.episode > config.learning_starts
+    if learned and not math.isfinite(record.loss) and record.updates:
+        raise UserError(
+            f"episode {record.episode}: the loss is {record.loss}, learning has diverged; try a "
+            "smaller learning_rate"
+        )

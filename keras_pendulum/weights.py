@@ -1,0 +1,110 @@
+"""Networks to `.h5` and back, in the Keras 2 layout that Keras 2 and Keras 3 both load.
+
+Reading goes through `layer_files`, which checks everything before a network is made; no Keras
+loader ever touches the file.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import h5py
+from numpy.typing import NDArray
+
+from keras_pendulum import __version__, layer_files
+from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.errors import WeightsError
+from keras_pendulum.network import DQN, Origin
+
+_ORIGIN = "keras_pendulum"  # our group beside the layers; Keras ignores it
+
+
+def save_weights(network: DQN, path: str | os.PathLike[str]) -> None:
+    """Writes the network to `path`, replacing an old file only when the new one is whole.
+
+    Keras 2 and Keras 3 open the file with `model.load_weights`.
+
+    Raises:
+        UserError: the file cannot be written.
+    """
+    write_atomically(path, weights_file(network))
+
+
+def weights_file(network: DQN, **groups: dict[str, NDArray[Any]]) -> bytes:
+    """The bytes of the network's `.h5`, with further groups of arrays beside the layers."""
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        layer_files.write_layers(file, network.get_weights())
+        about = file.create_group(_ORIGIN).attrs
+        about["version"] = __version__
+        about["activation"] = network.activation
+        about["environment"] = network.origin.environment
+        for name in ("gravity", "preset", "seed"):
+            value = getattr(network.origin, name)
+            if value is not None:
+                about[name] = value
+        for name, arrays in groups.items():
+            group = file.create_group(name)
+            for key, array in arrays.items():
+                group.create_dataset(key, data=array)
+    return stream.getvalue()
+
+
+def load_weights(path: str | os.PathLike[str]) -> DQN:
+    """The network in a `.h5` of this package, of Keras 2, or of Keras 3 (`.weights.h5`).
+
+    Layer sizes and action count are read from the file; a file that does not record its hidden
+    activation is taken to use tanh.
+
+    Raises:
+        WeightsError: the file is missing, damaged, or not such a network; says what is wrong.
+    """
+    with layer_files.opened(path) as file:
+        layers = layer_files.read_layers(file, path, inputs=3)  # cos θ, sin θ, θ̇
+        activation, origin = _read_origin(file, path)
+    kernels = layers[::2]
+    network = DQN(
+        [kernel.shape[1] for kernel in kernels[:-1]],
+        kernels[-1].shape[1],
+        activation=activation,
+        origin=origin,
+    )
+    network.set_weights(layers)
+    return network
+
+
+def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Origin]:
+    about = file[_ORIGIN].attrs if _ORIGIN in file else {}
+    activation = about.get("activation", "tanh")
+    if activation != "tanh":
+        raise WeightsError(f"{path}: records the activation {activation!r}; expected 'tanh'")
+    gravity = about.get("gravity")
+    if gravity is not None and not 0 <= gravity <= 100:
+        raise WeightsError(f"{path}: records a gravity of {gravity}; expected 0 to 100 m/s²")
+    return activation, Origin(
+        environment=str(about.get("environment", "Pendulum-v1")),
+        gravity=None if gravity is None else float(gravity),
+        preset=str(about["preset"]) if "preset" in about else None,
+        seed=int(about["seed"]) if "seed" in about else None,
+    )
+
+
+def find_weights(name: str) -> Path:
+    """The path of a weights file: `name` itself, or the shipped file `name`(.h5).
+
+    Raises:
+        WeightsError: there is no such file.
+    """
+    path = Path(name)
+    if path.exists():
+        return path
+    here = Path(__file__).parent
+    # In a wheel the shipped weights lie inside the package, in a checkout beside it.
+    for folder in (here / "shipped_weights", here.parent / "weights"):
+        for candidate in (folder / name, folder / f"{name}.h5"):
+            if path.name == name and candidate.is_file():
+                return candidate
+    raise WeightsError(f"{name}: no such file; expected a weights file (.h5)")
