@@ -9,6 +9,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from keras_pendulum.backend import prepare_environment, require_tensorflow
+
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
@@ -48,11 +50,12 @@ _HOMES = {
 }
 
 
+prepare_environment()
+
+
 def __getattr__(name: str) -> Any:
     for home, names in _HOMES.items():
         if name in names:
-            from keras_pendulum.backend import require_tensorflow
-
             require_tensorflow()
             return getattr(importlib.import_module(f"keras_pendulum.{home}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

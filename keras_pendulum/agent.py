@@ -90,7 +90,7 @@ class Agent:
         """
         return {
             "target": self.target.get_weights(),
-            "optimizer": [np.array(variable) for variable in self.optimizer.variables],
+            "optimizer": [variable.value.numpy() for variable in self.optimizer.variables],
         }
 
     def set_state(self, online: list[NDArray[Any]], state: dict[str, list[NDArray[Any]]]) -> None:

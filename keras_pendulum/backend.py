@@ -7,6 +7,7 @@ import os
 from keras_pendulum.errors import UserError
 
 _ENVIRONMENT = {
+    "KERAS_BACKEND": "tensorflow",
     # How many threads share a matrix product decides how its sums are rounded, and one rounded
     # digit can part two runs: with one thread a run does not depend on the number of cores.
     "TF_NUM_INTRAOP_THREADS": "1",
@@ -16,17 +17,19 @@ _ENVIRONMENT = {
 }
 
 
-def require_tensorflow() -> None:
-    """Prepares the process for TensorFlow; to be called before Keras is imported.
+def prepare_environment() -> None:
+    """Sets what TensorFlow reads when it is imported; what the user has set stays.
 
-    What the user has set in the environment stays.
-
-    Raises UserError when Keras was asked to run on another backend.
+    It has no effect on a TensorFlow that is in use already.
     """
-    backend = os.environ.setdefault("KERAS_BACKEND", "tensorflow")
+    for name, value in _ENVIRONMENT.items():
+        os.environ.setdefault(name, value)
+
+
+def require_tensorflow() -> None:
+    """Raises UserError when Keras was asked to run on another backend."""
+    backend = os.environ["KERAS_BACKEND"]
     if backend != "tensorflow":
         raise UserError(
             f"KERAS_BACKEND is {backend!r}, but this package runs on TensorFlow: unset it"
         )
-    for name, value in _ENVIRONMENT.items():
-        os.environ.setdefault(name, value)

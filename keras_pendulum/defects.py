@@ -8,12 +8,14 @@ part. The defects that no preset can run (`torque-offset`, `hard-coded-batch`,
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from keras_pendulum.torque import TorqueGrid
 
 
-def truncated_index(torque: float) -> int:
+def truncated_index(torque: float | np.floating[Any]) -> int:
     """The walkthrough's way from a torque (N·m) back to its index: cut off, not rounded."""
     return int((torque + 2) * 10)
 

@@ -77,6 +77,10 @@ def read_layers(
                 f"{path}: layer {name} has {len(datasets)} arrays; expected kernel and bias"
             )
         kernel, bias = (read_array(dataset, path) for dataset in datasets)
+        if kernel.dtype.kind != "f" or bias.dtype.kind != "f":
+            raise WeightsError(
+                f"{path}: layer {name} is of {kernel.dtype}; expected floating-point"
+            )
         if kernel.ndim != 2 or bias.shape != kernel.shape[1:]:
             raise WeightsError(
                 f"{path}: layer {name} has shapes {kernel.shape} and {bias.shape}; "

@@ -94,7 +94,10 @@ class Config:
 
     def __post_init__(self) -> None:
         for spec in fields(self):
-            _check(spec.name, getattr(self, spec.name), spec.metadata)
+            value = getattr(self, spec.name)
+            _check(spec.name, spec.type, value, spec.metadata)
+            if spec.type == "float":  # 3 means 3.0
+                object.__setattr__(self, spec.name, float(value))
         if self.batch_size > self.replay_capacity:
             raise ConfigError(
                 f"batch_size {self.batch_size} is larger than replay_capacity "
@@ -112,7 +115,7 @@ class Config:
         return max(0, self.episodes - self.learning_starts - 1) * self.updates_per_episode
 
 
-def _check(name: str, value: Any, rule: Any) -> None:
+def _check(name: str, kind: Any, value: Any, rule: Any) -> None:
     if rule["choices"] is not None and value not in rule["choices"]:
         raise ConfigError(f"{name} is {value!r}; expected one of {', '.join(rule['choices'])}")
     if rule["low"] is None:
@@ -121,8 +124,10 @@ def _check(name: str, value: Any, rule: Any) -> None:
     if not 1 <= len(numbers) <= 16:
         raise ConfigError(f"{name} has {len(numbers)} entries; expected 1 to 16")
     for number in numbers:
-        if isinstance(number, bool) or not math.isfinite(number):
+        if kind == "float" and not math.isfinite(number):
             raise ConfigError(f"{name} is {number}; expected a finite number")
+        if kind != "float" and type(number) is not int:
+            raise ConfigError(f"{name} is {number!r}; expected a whole number")
         if not rule["low"] <= number <= rule["high"]:
             raise ConfigError(
                 f"{name} is {number}; expected a number from {rule['low']} to {rule['high']}"

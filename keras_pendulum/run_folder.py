@@ -52,8 +52,9 @@ class RunFolder:
     def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
         """Writes the settings, and the history of the episodes before a resumed run goes on.
 
-        Raises UserError when the folder cannot be written.
+        A picture of what was here before goes. Raises UserError when the folder cannot be written.
         """
+        self.picture.unlink(missing_ok=True)
         write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
         lines = [",".join(_COLUMNS), *map(_row, history)]
         write_atomically(self.history, "".join(line + "\n" for line in lines).encode())

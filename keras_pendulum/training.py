@@ -62,9 +62,9 @@ def train_dqn(
             raise UserError("resume needs the folder of the run to go on with")
         run = load_checkpoint(folder.weights, config)
     else:
-        run = Run(config, init)
         if folder is not None:
             folder.claim(overwrite)
+        run = Run(config, init)
     if folder is not None:
         folder.begin(config, run.history)
     finished = True

@@ -1,0 +1,1 @@
+"""Figures that the README states, each from one command."""

@@ -1,0 +1,203 @@
+"""The commands as a person types them, right and wrong."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import DATA, Command, command_line
+from PIL import Image, ImageSequence
+
+import keras_pendulum as kp
+from keras_pendulum import evaluate, train
+
+RECORDED = DATA / "pendulum_weight.keras2.h5"
+
+
+@pytest.mark.parametrize("name", ["train", "evaluate"])
+def test_help_comes_without_tensorflow(name: str) -> None:
+    code = (
+        "import runpy, sys\n"
+        f"sys.argv = ['{name}', '--help']\n"
+        "try:\n"
+        f"    runpy.run_module('keras_pendulum.{name}', run_name='__main__')\n"
+        "except SystemExit as exit:\n"
+        "    assert exit.code == 0\n"
+        "heavy = {'tensorflow', 'keras', 'gymnasium', 'matplotlib', 'h5py', 'numpy'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "usage: python -m keras_pendulum." in done.stdout
+
+
+def test_every_setting_is_a_flag_with_a_help_text() -> None:
+    done = subprocess.run(
+        command_line("train", "--help"),
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "COLUMNS": "300"},
+    )
+    for name in kp.Config.__dataclass_fields__:
+        assert f"--{name.replace('_', '-')}" in done.stdout
+
+
+def test_train_prints_a_line_an_episode_and_says_how_good_it_is(
+    command: Command, tmp_path: Path
+) -> None:
+    done = command("train", "--episodes", "3", "--seed", "4", "--hidden-units", "16,8")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert [line.split(",")[0] for line in lines[:3]] == [f"Episode: {i}" for i in range(3)]
+    assert "best possible" in done.stdout.lower()
+    assert "Regret: " in done.stdout
+    folder = tmp_path / "runs" / "reference-seed4"
+    assert (folder / "pendulum_weight.h5").exists()
+    assert kp.load_weights(folder / "pendulum_weight.h5").hidden_units == (16, 8)
+
+    again = command("train", "--episodes", "3", "--seed", "4", "--hidden-units", "16,8")
+    assert (again.returncode, again.stdout) == (2, "")
+    assert again.stderr.count("\n") == 1
+    assert again.stderr.startswith(f"error: {Path('runs') / 'reference-seed4'} already holds a run")
+
+    longer = command("train", "--resume", "--seed", "4", "--episodes", "5")
+    assert longer.returncode == 0, longer.stderr
+    assert longer.stdout.startswith("Episode: 3,")
+    clash = command("train", "--resume", "--seed", "4", "--gravity", "3")
+    assert (clash.returncode, clash.stderr.count("\n")) == (2, 1)
+    assert "this run has gravity 1.0, not 3.0" in clash.stderr
+
+
+def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
+    controller, terminal = pty.openpty()
+    arguments = ["--preset", "original", "--episodes", "3", "--hidden-units", "8"]
+    with subprocess.Popen(
+        command_line("train", *arguments), cwd=tmp_path, stdout=terminal, close_fds=True
+    ) as process:
+        os.close(terminal)
+        output = b""
+        try:
+            while chunk := os.read(controller, 4096):
+                output += chunk
+        except OSError:  # Linux's way to say that the other end has closed
+            pass
+    os.close(controller)
+    assert process.returncode == 0
+    text = output.decode()
+    assert "3/3" in text
+    assert "return: " in text
+    assert "epsilon: " in text
+    assert "Episode: " not in text
+    assert "Regret: " in text
+
+
+def test_evaluate_tells_the_same_as_the_library_and_twice_the_same(command: Command) -> None:
+    first, second = (command("evaluate", RECORDED, "--episodes", "4", "--json") for _ in range(2))
+    assert first.returncode == 0, first.stderr
+    assert first.stdout == second.stdout
+    score = kp.evaluate_policy(kp.load_weights(RECORDED), 4)
+    assert json.loads(first.stdout) == {"weights": str(RECORDED), **score.as_json()}
+
+
+def test_evaluate_for_people(command: Command) -> None:
+    done = command("evaluate", RECORDED, "--episodes", "2", "--seed", "3", "--gravity", "10")
+    assert done.returncode == 0, done.stderr
+    assert "2 fixed starts, Pendulum-v1, g = 10" in done.stdout
+    assert "Regret: " in done.stdout
+
+
+def test_evaluate_films_the_first_episode(command: Command, tmp_path: Path) -> None:
+    done = command("evaluate", RECORDED, "--episodes", "1", "--gif", "film.gif")
+    assert done.returncode == 0, done.stderr
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.size == (250, 250)
+        assert len(list(ImageSequence.Iterator(film))) > 50  # Pillow joins frames that are alike
+    assert (tmp_path / "film.gif").stat().st_size < 500_000
+
+
+def test_evaluate_shows_the_episodes_with_a_dummy_display(command: Command) -> None:
+    done = command(
+        "evaluate",
+        RECORDED,
+        "--episodes",
+        "1",
+        "--render",
+        environment={"SDL_VIDEODRIVER": "dummy"},
+    )
+    assert done.returncode == 0, done.stderr
+
+
+WRONG = [
+    (["train", "--preset", "nonsense"], "unknown preset 'nonsense'"),
+    (["train", "--episodes", "-5"], "episodes is -5"),
+    (["train", "--episodes", "ten"], "invalid int value: 'ten'"),
+    (["train", "--gravity", "nan"], "gravity is nan"),
+    (["train", "--learning-rate", "inf"], "learning_rate is inf"),
+    (["train", "--hidden-units", "8,,8"], "invalid list of whole numbers value"),
+    (["train", "--batch-size", "999999999"], "batch_size is 999999999"),
+    (["train", "--colour", "red"], "unrecognized arguments: --colour red"),
+    (["train", "--resume", "--overwrite"], "not allowed with"),
+    (["train", "--resume"], "no such file"),
+    (["train", "--init", "missing.h5"], "missing.h5: no such file"),
+    (["train", "--init", "text.h5"], "text.h5: not an HDF5 file"),
+    (["train", "--init", RECORDED, "--hidden-units", "8"], "layers 512-256-128-41"),
+    (["train", "--out", "text.h5"], "cannot make the folder text.h5"),
+    (["train", "--out", "/proc/nowhere"], "cannot make the folder /proc/nowhere"),
+    (["evaluate"], "the following arguments are required: WEIGHTS.h5"),
+    (["evaluate", "missing.h5"], "missing.h5: no such file"),
+    (["evaluate", "text.h5"], "text.h5: not an HDF5 file"),
+    (["evaluate", RECORDED, "--episodes", "0"], "episodes is 0"),
+    (["evaluate", RECORDED, "--seed", "-1"], "seed is -1"),
+    (["evaluate", RECORDED, "--gravity", "nan"], "gravity is nan"),
+    (["evaluate", RECORDED, "--episodes", "1", "--gif", "no/such/folder.gif"], "cannot write"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), WRONG, ids=lambda value: str(value)[:60])
+def test_a_mistake_gets_one_clear_line_and_exit_status_2(
+    words: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "text.h5").write_text("not weights")
+    monkeypatch.chdir(tmp_path)
+    main = {"train": train.main, "evaluate": evaluate.main}[words[0]]
+    try:
+        status = main([str(word) for word in words[1:]])
+    except SystemExit as exit:  # argparse leaves by itself
+        assert isinstance(exit.code, int)
+        status = exit.code
+    printed = capsys.readouterr()
+    assert status == 2
+    assert printed.out == ""
+    assert printed.err.startswith("error: ")
+    assert printed.err.count("\n") == 1
+    assert message in printed.err
+    assert [file.name for file in tmp_path.iterdir() if file.is_file()] == ["text.h5"]
+    assert (tmp_path / "text.h5").read_text() == "not weights"
+
+
+@pytest.mark.parametrize(
+    "words", [["train"], ["evaluate", str(RECORDED)]], ids=["train", "evaluate"]
+)
+def test_another_keras_backend_is_told(words: list[str], command: Command) -> None:
+    done = command(*words, environment={"KERAS_BACKEND": "torch"})
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: KERAS_BACKEND is 'torch', but this package runs on TensorFlow: unset it\n"
+    )
+
+
+def test_the_librarys_names_are_all_there() -> None:
+    assert all(getattr(kp, name) is not None for name in kp.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        kp.nonsense  # noqa: B018

@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.presets import PRESETS, Config
+
+INF, NAN = float("inf"), float("nan")
+
+
+def test_the_original_has_the_final_listings_numbers() -> None:
+    config = kp.preset("original")
+    assert config.hidden_units == (512, 256, 128)
+    assert (config.gravity, config.episodes, config.torque_count) == (1.0, 500, 41)
+    assert (config.replay_capacity, config.batch_size, config.discount) == (8000, 32, 0.9)
+    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.99, 0.01)
+    assert (config.learning_starts, config.updates_per_episode) == (40, 1)
+    assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "constant")
+    assert (config.target_update, config.remembered_action) == ("none", "index")
+    assert config.total_updates == 459
+
+
+def test_the_walkthrough_has_the_step_by_step_numbers() -> None:
+    config = kp.preset("walkthrough")
+    assert config.hidden_units == (128, 64, 32)
+    assert (config.replay_capacity, config.batch_size, config.episodes) == (4000, 64, 400)
+    assert (config.learning_starts, config.updates_per_episode) == (40, 1)
+    assert (config.target_update, config.remembered_action) == ("none", "truncated")
+
+
+def test_the_default_is_the_reference() -> None:
+    assert kp.preset() == kp.preset("reference") == Config()
+    assert Config().target_update != "none"
+    assert Config().remembered_action == "index"
+
+
+def test_every_setting_says_what_it_means() -> None:
+    for spec in dataclasses.fields(Config):
+        assert len(spec.metadata["meaning"]) > 10, spec.name
+
+
+def test_settings_can_be_changed_one_by_one() -> None:
+    config = kp.preset("reference", seed=3, episodes=200)
+    assert (config.seed, config.episodes, config.preset) == (3, 200, "reference")
+
+
+@pytest.mark.parametrize("name", ["nonsense", "", "Reference"])
+def test_an_unknown_preset_is_told_with_the_known_ones(name: str) -> None:
+    with pytest.raises(kp.ConfigError, match=f"unknown preset '{name}'.*reference, original"):
+        kp.preset(name)
+
+
+def test_an_unknown_setting_is_named() -> None:
+    with pytest.raises(kp.ConfigError, match="unknown setting learning_speed"):
+        kp.preset("reference", learning_speed=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *[("gravity", value) for value in (-1.0, NAN, INF, 101.0)],
+        *[("episodes", value) for value in (0, -5, 10**9)],
+        *[("seed", value) for value in (-1, 2**32)],
+        *[("hidden_units", value) for value in ((), (0,), (10**6,), (8,) * 17)],
+        *[("torque_count", value) for value in (0, 1, 10**6)],
+        *[("replay_capacity", value) for value in (0, -1, 10**12)],
+        *[("batch_size", value) for value in (0, 10**9)],
+        *[("discount", value) for value in (-0.1, 1.1, NAN)],
+        *[("epsilon_start", value) for value in (-0.1, 1.1, NAN)],
+        *[("learning_rate", value) for value in (0.0, -1e-3, NAN, INF, 1e9)],
+        *[("updates_per_episode", value) for value in (0, -1)],
+        *[("target_blend", value) for value in (-0.1, 1.5, NAN)],
+        *[("target_update", value) for value in ("", "sometimes")],
+        *[("learning_rate_schedule", value) for value in ("linear",)],
+        *[("environment", value) for value in ("CartPole-v1", "Nonsense-v0")],
+        *[("save_every", value) for value in (0, -1)],
+        *[("episodes", value) for value in (1.5, True, "12", None)],
+    ],
+)
+def test_a_value_that_no_run_can_have_is_named(name: str, value: Any) -> None:
+    with pytest.raises(kp.ConfigError, match=f"^{name} "):
+        kp.preset("reference", **{name: value})
+
+
+def test_a_batch_larger_than_the_buffer_is_refused() -> None:
+    with pytest.raises(kp.ConfigError, match="no batch could ever be drawn"):
+        kp.preset("reference", batch_size=64, replay_capacity=50)
+
+
+def test_presets_are_listed_by_their_own_name() -> None:
+    assert all(config.preset == name for name, config in PRESETS.items())

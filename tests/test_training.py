@@ -1,0 +1,202 @@
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+from conftest import command_line
+
+import keras_pendulum as kp
+from keras_pendulum.checkpoint import load_checkpoint, load_config, save_checkpoint
+from keras_pendulum.run import Run
+
+SHORT: dict[str, Any] = {"episodes": 46}  # learning begins at episode 41
+
+
+def comparable(result: kp.TrainingResult) -> list[tuple[float, ...]]:
+    """The history but for its wall-clock times."""
+    return [
+        tuple(-1.0 if np.isnan(value) else value for value in record[:-1])
+        for record in result.history
+    ]
+
+
+def assert_same(ours: kp.TrainingResult, theirs: kp.TrainingResult) -> None:
+    assert comparable(ours) == comparable(theirs)
+    for mine, yours in zip(ours.network.get_weights(), theirs.network.get_weights(), strict=True):
+        np.testing.assert_array_equal(mine, yours)
+
+
+@pytest.mark.parametrize("name", ["original", "walkthrough", "reference"])
+def test_the_same_seed_twice_is_the_same_run_bit_for_bit(name: str) -> None:
+    config = kp.preset(name, **SHORT)
+    assert_same(kp.train_dqn(config), kp.train_dqn(config))
+
+
+def test_another_seed_is_another_run() -> None:
+    first, second = (kp.train_dqn(kp.preset("original", seed=seed, **SHORT)) for seed in (0, 1))
+    assert comparable(first) != comparable(second)
+
+
+def test_a_short_run_learns_far_better_than_chance(tmp_path: Path) -> None:
+    result = kp.train_dqn(kp.preset("reference", episodes=150), tmp_path)
+    score = kp.evaluate_policy(result.network, episodes=30)
+    assert score.mean_return > -250  # uniformly random torque: -909
+    saved = kp.evaluate_policy(kp.load_weights(tmp_path / "pendulum_weight.h5"), episodes=30)
+    np.testing.assert_array_equal(saved.returns, score.returns)
+
+
+def test_a_run_leaves_its_four_files(tmp_path: Path) -> None:
+    config = kp.preset("reference", **SHORT)
+    result = kp.train_dqn(config, tmp_path / "new" / "folder")
+    folder = tmp_path / "new" / "folder"
+    assert {file.name for file in folder.iterdir()} == {
+        "pendulum_weight.h5",
+        "history.csv",
+        "config.json",
+        "rewards.png",
+    }
+    written = json.loads((folder / "config.json").read_text())
+    assert kp.Config(**{**written, "hidden_units": tuple(written["hidden_units"])}) == config
+
+    with open(folder / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert ",".join(rows[0]) == (
+        "episode,average_reward,return,epsilon,loss,environment_steps,updates,seconds"
+    )
+    assert len(rows) == 46
+    assert [float(row["return"]) for row in rows] == [r.episode_return for r in result.history]
+    assert rows[40]["loss"] == ""
+    assert float(rows[41]["loss"]) > 0
+    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "150")
+
+    picture = matplotlib.image.imread(folder / "rewards.png")
+    assert picture.shape[0] > 300
+    assert picture[..., :3].std() > 0.05  # something is drawn
+
+
+def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "pendulum_weight.h5"
+    saved: list[int] = []
+    before: bytes | None = None
+
+    def look(record: Any) -> None:
+        nonlocal before
+        content = path.read_bytes() if path.exists() else None
+        if content != before:
+            saved.append(record.episode)
+            before = content
+
+    config = kp.preset("original", episodes=24, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path, listeners=[look])
+    assert saved == [0, 10, 20]
+    assert len(load_checkpoint(path, config).history) == 24
+
+
+def test_a_used_folder_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(kp.UserError, match=r"already holds a run.*--resume.*--overwrite"):
+        kp.train_dqn(config, tmp_path)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+    kp.train_dqn(kp.preset("original", episodes=3, hidden_units=(8,)), tmp_path, overwrite=True)
+    assert len((tmp_path / "history.csv").read_text().splitlines()) == 4
+
+
+@pytest.mark.parametrize("name", ["original", "walkthrough", "reference"])
+def test_a_stopped_and_resumed_run_ends_like_one_never_stopped(name: str, tmp_path: Path) -> None:
+    # A small buffer, so that its ring has wrapped round by then.
+    config = kp.preset(name, episodes=50, replay_capacity=3000)
+    whole = kp.train_dqn(config, tmp_path / "whole")
+    for stop_after in (5, 44):
+        stopped = kp.train_dqn(
+            config,
+            tmp_path / "parts",
+            resume=stop_after > 5,
+            should_stop=iter([False] * (stop_after if stop_after == 5 else 30) + [True]).__next__,
+        )
+        assert not stopped.finished
+    resumed = kp.train_dqn(config, tmp_path / "parts", resume=True)
+    assert resumed.finished
+    assert_same(resumed, whole)
+    rows = [
+        (tmp_path / part / "history.csv").read_text().splitlines() for part in ("whole", "parts")
+    ]
+    ours, theirs = ([line.rsplit(",", 1)[0] for line in lines] for lines in rows)
+    assert ours == theirs
+
+
+def test_a_finished_run_can_be_made_longer(tmp_path: Path) -> None:
+    config = kp.preset("original", hidden_units=(8,), episodes=44)
+    kp.train_dqn(config, tmp_path)
+    longer = kp.preset("original", hidden_units=(8,), episodes=48)
+    assert_same(kp.train_dqn(longer, tmp_path, resume=True), kp.train_dqn(longer))
+
+
+def test_resuming_with_other_settings_names_the_one_that_differs(tmp_path: Path) -> None:
+    kp.train_dqn(kp.preset("original", episodes=2, hidden_units=(8,)), tmp_path)
+    other = kp.preset("original", episodes=2, hidden_units=(8,), gravity=3.0)
+    with pytest.raises(kp.ConfigError, match=r"this run has gravity 1\.0, not 3\.0"):
+        kp.train_dqn(other, tmp_path, resume=True)
+
+
+def test_a_file_with_weights_alone_is_no_run_to_resume(tmp_path: Path) -> None:
+    kp.save_weights(kp.DQN((8,)), tmp_path / "pendulum_weight.h5")
+    with pytest.raises(kp.WeightsError, match="weights alone"):
+        kp.train_dqn(kp.preset("original"), tmp_path, resume=True)
+
+
+def test_a_checkpoint_records_the_runs_settings(tmp_path: Path) -> None:
+    config = kp.preset("walkthrough", gravity=2.5, seed=9)
+    save_checkpoint(Run(config), tmp_path / "a.h5")
+    assert load_config(tmp_path / "a.h5") == config
+
+
+def test_a_run_that_diverges_stops_and_keeps_the_last_good_checkpoint(tmp_path: Path) -> None:
+    # Without a target network and at this pace the values grow beyond all bounds.
+    config = kp.preset("original", episodes=60, learning_rate=10, updates_per_episode=200)
+    with pytest.raises(kp.UserError, match=r"episode \d+: .*diverged"):
+        kp.train_dqn(config, tmp_path)
+    weights = kp.load_weights(tmp_path / "pendulum_weight.h5").get_weights()
+    assert all(np.isfinite(array).all() for array in weights)
+
+
+def test_initial_weights_are_the_given_networks(tmp_path: Path) -> None:
+    given = kp.DQN((8,), seed=77)
+    config = kp.preset("original", hidden_units=(8,), episodes=2)
+    result = kp.train_dqn(config, init=given)
+    for ours, theirs in zip(result.network.get_weights(), given.get_weights(), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    with pytest.raises(kp.ConfigError, match="8-41, the settings say 512-256-128-41"):
+        kp.train_dqn(kp.preset("original"), init=given)
+
+
+def test_control_c_saves_a_checkpoint_and_exits_130(tmp_path: Path) -> None:
+    arguments = ["--preset", "original", "--seed", "5", "--out", str(tmp_path / "run")]
+    with subprocess.Popen(
+        command_line("train", *arguments, "--episodes", "100000"),
+        cwd=tmp_path,
+        env=os.environ,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        lines = []
+        for line in process.stdout:
+            lines.append(line)
+            if line.startswith("Episode: 13,"):
+                process.send_signal(signal.SIGINT)
+    assert process.returncode == 130
+    assert lines[-1].startswith("Go on: python -m keras_pendulum.train --resume")
+    config = load_config(tmp_path / "run" / "pendulum_weight.h5")
+    saved = load_checkpoint(tmp_path / "run" / "pendulum_weight.h5", config)
+    printed = [line for line in lines if line.startswith("Episode: ")]
+    assert [record.line() + "\n" for record in saved.history] == printed

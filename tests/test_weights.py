@@ -1,0 +1,293 @@
+"""Weights files: ours, Keras 2's and Keras 3's, and the ones that nobody should load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import keras
+import numpy as np
+import pytest
+from conftest import DATA
+
+import keras_pendulum as kp
+from keras_pendulum.network import Origin
+
+OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
+
+
+def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
+    return kp.DQN(hidden, actions, seed=3, origin=Origin("Pendulum-v1", 2.5, "reference", 7))
+
+
+def dense_layers(keras_module: Any, hidden: tuple[int, ...], actions: int) -> list[Any]:
+    layers = [keras_module.layers.Dense(units, activation="tanh") for units in hidden]
+    return [*layers, keras_module.layers.Dense(actions)]
+
+
+def subclassed(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
+    """The student's model, in either Keras."""
+
+    class Model(keras_module.Model):
+        def __init__(self) -> None:
+            super().__init__()
+            self.all = dense_layers(keras_module, hidden, actions)
+
+        def call(self, inputs: Any) -> Any:
+            for layer in self.all:
+                inputs = layer(inputs)
+            return inputs
+
+    model = Model()
+    model(OBSERVATIONS)
+    return model
+
+
+def sequential(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
+    return keras_module.Sequential(
+        [keras_module.Input((3,)), *dense_layers(keras_module, hidden, actions)]
+    )
+
+
+@pytest.fixture(scope="module")
+def keras2() -> Any:
+    return pytest.importorskip("tf_keras", reason="Keras 2 comes with the extra `test`")
+
+
+def assert_same_values(ours: Any, theirs: Any, tolerance: float = 0) -> None:
+    np.testing.assert_allclose(ours(OBSERVATIONS), theirs(OBSERVATIONS), rtol=0, atol=tolerance)
+
+
+def test_a_saved_network_comes_back_bit_for_bit_with_its_origin(tmp_path: Path) -> None:
+    saved = network()
+    kp.save_weights(saved, tmp_path / "a.h5")
+    loaded = kp.load_weights(tmp_path / "a.h5")
+    for ours, theirs in zip(loaded.get_weights(), saved.get_weights(), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert loaded.origin == saved.origin
+    assert (loaded.hidden_units, loaded.action_count) == ((16, 8), 5)
+    assert loaded.built
+
+
+@pytest.mark.parametrize("make", [subclassed, sequential])
+def test_keras_3_opens_our_file(make: Callable[..., Any], tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    model = make(keras)
+    model.load_weights(tmp_path / "a.h5")
+    assert_same_values(model, network(), 1e-6)
+
+
+@pytest.mark.parametrize("make", [subclassed, sequential])
+def test_keras_2_opens_our_file(make: Callable[..., Any], keras2: Any, tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    model = make(keras2)
+    model.load_weights(str(tmp_path / "a.h5"))
+    assert_same_values(model, network(), 1e-6)
+
+
+@pytest.mark.parametrize("make_name", ["subclassed", "sequential"])
+def test_both_keras_open_a_checkpoint_of_a_run(make_name: str, keras2: Any, tmp_path: Path) -> None:
+    make = {"subclassed": subclassed, "sequential": sequential}[make_name]
+    config = kp.preset("reference", episodes=42, hidden_units=(16, 8), torque_count=5)
+    result = kp.train_dqn(config, tmp_path)
+    for module in (keras, keras2):
+        model = make(module)
+        model.load_weights(str(tmp_path / "pendulum_weight.h5"))
+        assert_same_values(model, result.network, 1e-6)
+
+
+@pytest.mark.parametrize("hidden", [(512, 256, 128), (128, 64, 32)])
+@pytest.mark.parametrize("actions", [41, 7])
+def test_we_open_keras_2s_files_of_other_sizes(
+    hidden: tuple[int, ...], actions: int, keras2: Any, tmp_path: Path
+) -> None:
+    model = subclassed(keras2, hidden, actions)
+    model.save_weights(str(tmp_path / "a.h5"))
+    loaded = kp.load_weights(tmp_path / "a.h5")
+    assert (loaded.hidden_units, loaded.action_count) == (hidden, actions)
+    assert_same_values(loaded, model, 1e-6)
+
+
+def test_we_open_a_flat_sequential_of_keras_2(keras2: Any, tmp_path: Path) -> None:
+    layers = [keras2.layers.Flatten(), *dense_layers(keras2, (16, 8), 5)]
+    model = keras2.Sequential([keras2.Input((3,)), *layers, keras2.layers.Activation("linear")])
+    model.save_weights(str(tmp_path / "a.h5"))
+    assert_same_values(kp.load_weights(tmp_path / "a.h5"), model, 1e-6)
+
+
+@pytest.mark.parametrize("make", [subclassed, sequential])
+def test_we_open_keras_3s_own_files(make: Callable[..., Any], tmp_path: Path) -> None:
+    # Twelve layers, because as text "dense_10" sorts before "dense_2".
+    model = make(keras, hidden=(6,) * 11)
+    model.compile("adam", "mse")
+    model.train_on_batch(OBSERVATIONS, np.zeros((20, 5)))  # so that it has an optimizer to save
+    model.save_weights(tmp_path / "a.weights.h5")
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), model, 1e-6)
+
+
+def test_we_open_keras_3s_file_of_our_own_network(tmp_path: Path) -> None:
+    network().save_weights(tmp_path / "a.weights.h5")
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), network(), 0)
+
+
+def test_we_open_keras_3s_file_of_layers_with_names_of_their_own(tmp_path: Path) -> None:
+    model = named_layers(zebra=16, apple=8, mango=5)
+    model.save_weights(tmp_path / "a.weights.h5")
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), model, 1e-6)
+
+
+def test_layers_whose_order_cannot_be_told_are_refused(tmp_path: Path) -> None:
+    named_layers(zebra=8, apple=8, mango=8, kiwi=5).save_weights(tmp_path / "a.weights.h5")
+    with pytest.raises(kp.WeightsError, match=r"order of its layers .* unclear"):
+        kp.load_weights(tmp_path / "a.weights.h5")
+
+
+def named_layers(**units: int) -> Any:
+    """A Keras 3 model that keeps its layers under names which say nothing of their order."""
+
+    class Model(keras.Model):
+        def __init__(self) -> None:
+            super().__init__()
+            for name, count in units.items():
+                activation = None if name == list(units)[-1] else "tanh"
+                setattr(self, name, keras.layers.Dense(count, activation, name=name))
+
+        def call(self, inputs: Any) -> Any:
+            for name in units:
+                inputs = getattr(self, name)(inputs)
+            return inputs
+
+    model = Model()
+    model(OBSERVATIONS)
+    return model
+
+
+def changed(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
+    """Makes a good file and changes something in it."""
+
+    def make(path: Path) -> None:
+        kp.save_weights(network(), path)
+        with h5py.File(path, "r+") as file:
+            change(file)
+
+    return make
+
+
+def replace_array(name: str, array: Any, **options: Any) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, data=array, **options)
+
+    return change
+
+
+def set_value(file: h5py.File, value: float) -> None:
+    file["dense/dense/kernel:0"][1, 2] = value
+
+
+def truncate(path: Path) -> None:
+    kp.save_weights(network(), path)
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def other_model(path: Path) -> None:
+    model = keras.Sequential([keras.Input((8, 8, 1)), keras.layers.Conv2D(2, 3)])
+    model.save_weights(path.with_suffix(".weights.h5"))
+    path.with_suffix(".weights.h5").rename(path)
+
+
+KERNEL = np.zeros((16, 8), np.float32)
+BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "missing": (lambda path: None, "no such file"),
+    "folder": (lambda path: path.mkdir(), "not a file"),
+    "empty": (lambda path: path.write_bytes(b""), "the file is empty"),
+    "text": (lambda path: path.write_text("weights, honestly"), "not an HDF5 file"),
+    "html": (lambda path: path.write_text("<!DOCTYPE html><html>404"), "not an HDF5 file"),
+    "lfs": (lambda path: path.write_text("version https://git-lfs.example/v1"), "not an HDF5"),
+    "truncated": (truncate, "damaged"),
+    "no layers": (lambda path: h5py.File(path, "w").close(), "holds no network weights"),
+    "other data": (changed(lambda f: f.attrs.__delitem__("layer_names")), "no network weights"),
+    "convolution": (other_model, "expected a kernel"),
+    "cartpole": (lambda path: kp.save_weights(kp.DQN((8,), 2, observation_size=4), path), "4 inp"),
+    "wrong width": (
+        changed(replace_array("dense_1/dense_1/kernel:0", np.zeros((17, 8), "f4"))),
+        "takes 17 inputs; expected 16",
+    ),
+    "wrong bias": (
+        changed(replace_array("dense_1/dense_1/bias:0", np.zeros(9, "f4"))),
+        "expected a kernel",
+    ),
+    "missing bias": (changed(lambda f: f.__delitem__("dense_1/dense_1/bias:0")), "damaged"),
+    "nan": (changed(lambda f: set_value(f, np.nan)), "NaN or infinite"),
+    "inf": (changed(lambda f: set_value(f, np.inf)), "NaN or infinite"),
+    "text array": (
+        changed(replace_array("dense_1/dense_1/kernel:0", np.full((16, 8), b"x"))),
+        "not a plain array",
+    ),
+    "integers": (
+        changed(replace_array("dense_1/dense_1/kernel:0", np.zeros((16, 8), "i4"))),
+        "expected floating-point",
+    ),
+    "compressed": (
+        changed(replace_array("dense_1/dense_1/kernel:0", KERNEL, compression="gzip")),
+        "not a plain array",
+    ),
+    "activation": (
+        changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "relu")),
+        "activation 'relu'",
+    ),
+    "gravity": (
+        changed(lambda f: f["keras_pendulum"].attrs.__setitem__("gravity", np.nan)),
+        "gravity of nan",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_FILES)
+def test_a_bad_file_is_refused_in_one_line_that_names_it(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.h5"
+    make, message = BAD_FILES[kind]
+    make(path)
+    before = path.read_bytes() if path.is_file() else None
+    with pytest.raises(kp.WeightsError) as caught:
+        kp.load_weights(path)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert (path.read_bytes() if path.is_file() else None) == before
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    with pytest.raises(kp.UserError, match="cannot write"):
+        kp.save_weights(network(), tmp_path / "a.h5" / "b.h5")
+    with pytest.raises(kp.UserError, match=r"cannot write.*folder"):
+        kp.save_weights(network(), tmp_path)
+    with pytest.raises(kp.UserError, match="cannot write"):
+        kp.save_weights(network(), tmp_path / "missing" / "a.h5")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
+    assert_same_values(kp.load_weights(tmp_path / "a.h5"), network())
+
+
+def test_a_save_that_fails_half_way_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.h5"
+    kp.save_weights(network(), path)
+
+    def full_disk(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full_disk)
+    with pytest.raises(kp.UserError, match="No space left"):
+        kp.save_weights(kp.DQN((4,)), path)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
+    assert_same_values(kp.load_weights(path), network())
+
+
+def test_the_recorded_file_of_keras_2_loads() -> None:
+    loaded = kp.load_weights(DATA / "pendulum_weight.keras2.h5")
+    assert (loaded.hidden_units, loaded.action_count) == ((512, 256, 128), 41)
+    assert loaded.origin.gravity is None
