@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.backend import require_tensorflow
 from keras_pendulum.command_line import OneLineParser, run_command
+from keras_pendulum.display import draw_without_display, require_display
 
 if TYPE_CHECKING:
     from keras_pendulum.network import DQN
@@ -38,6 +39,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _evaluate(arguments: argparse.Namespace) -> int:
     require_tensorflow()
+    if arguments.render:
+        require_display()
 
     from keras_pendulum.evaluation import evaluate_policy
     from keras_pendulum.weights import find_weights, load_weights
@@ -66,6 +69,7 @@ def _film(network: DQN, seed: int, gravity: float, path: str) -> None:
     from keras_pendulum.atomic_file import write_atomically
     from keras_pendulum.evaluation import evaluate_policy
 
+    draw_without_display()
     frames: list[Any] = []
     evaluate_policy(
         network,

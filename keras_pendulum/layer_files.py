@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.errors import WeightsError
+from keras_pendulum.errors import UserError, WeightsError
 
 _LARGEST_FILE = 2**30  # bytes; the largest checkpoint of a preset has 6 MB
 _LARGEST_LAYER = 8192  # units
@@ -49,10 +49,10 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
             raise WeightsError(f"{path}: larger than 1 GiB; no network here is")
         with h5py.File(file, "r") as content:
             yield content
+    except UserError:
+        raise
     # h5py tells of damage with whatever its C library met.
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-        if isinstance(error, WeightsError):
-            raise
         reason = re.sub(r"\s+", " ", str(error)).strip()
         raise WeightsError(f"{path}: cannot be read, the file is damaged ({reason})") from error
 
@@ -121,8 +121,9 @@ def read_array(dataset: Any, path: str | os.PathLike[str], *, finite: bool = Tru
             "numbers stored whole in this file"
         )
     array: NDArray[Any] = dataset[()]
-    if finite and array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise WeightsError(f"{path}: {dataset.name} holds NaN or infinite numbers")
+    with np.errstate(over="ignore"):  # what float32 cannot hold is infinite to a network
+        if finite and not np.isfinite(array.astype(np.float32)).all():
+            raise WeightsError(f"{path}: {dataset.name} holds NaN or infinite numbers")
     return array
 
 

@@ -120,7 +120,7 @@ def _progress(config: Config) -> Callable[[EpisodeRecord], None]:
 
 
 def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) -> None:
-    from keras_pendulum.evaluation import evaluate_policy
+    from keras_pendulum.evaluation import evaluate_policy, random_return
 
     last = result.history[-1]
     state = "Trained" if result.finished else "Interrupted after"
@@ -131,6 +131,8 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
     if result.finished:
         score = evaluate_policy(result.network, _EVALUATION_EPISODES)
         print(score.summary())
+        chance = random_return(score.environment, score.gravity, _EVALUATION_EPISODES)
+        print(f"Uniformly random torque on the same starts: {chance:.2f}")
     saved = ", ".join(file.name for file in folder.files if file.exists())
     print(f"Saved in {folder.path}: {saved}")
     if not result.finished:

@@ -81,11 +81,14 @@ def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Or
     activation = about.get("activation", "tanh")
     if activation != "tanh":
         raise WeightsError(f"{path}: records the activation {activation!r}; expected 'tanh'")
+    environment = about.get("environment", "Pendulum-v1")
+    if environment != "Pendulum-v1":
+        raise WeightsError(f"{path}: belongs to {environment!r}; expected 'Pendulum-v1'")
     gravity = about.get("gravity")
     if gravity is not None and not 0 <= gravity <= 100:
         raise WeightsError(f"{path}: records a gravity of {gravity}; expected 0 to 100 m/s²")
     return activation, Origin(
-        environment=str(about.get("environment", "Pendulum-v1")),
+        environment=environment,
         gravity=None if gravity is None else float(gravity),
         preset=str(about["preset"]) if "preset" in about else None,
         seed=int(about["seed"]) if "seed" in about else None,

@@ -119,6 +119,7 @@ def test_evaluate_films_the_first_episode(command: Command, tmp_path: Path) -> N
     with Image.open(tmp_path / "film.gif") as film:
         assert film.size == (250, 250)
         assert len(list(ImageSequence.Iterator(film))) > 50  # Pillow joins frames that are alike
+    assert done.stderr == ""
     assert (tmp_path / "film.gif").stat().st_size < 500_000
 
 
@@ -132,6 +133,13 @@ def test_evaluate_shows_the_episodes_with_a_dummy_display(command: Command) -> N
         environment={"SDL_VIDEODRIVER": "dummy"},
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_a_window_without_a_display_is_told(command: Command) -> None:
+    nothing = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
+    done = command("evaluate", RECORDED, "--episodes", "1", "--render", environment=nothing)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "error: there is no display to open a window on\n"
 
 
 WRONG = [

@@ -222,6 +222,10 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "missing bias": (changed(lambda f: f.__delitem__("dense_1/dense_1/bias:0")), "damaged"),
     "nan": (changed(lambda f: set_value(f, np.nan)), "NaN or infinite"),
     "inf": (changed(lambda f: set_value(f, np.inf)), "NaN or infinite"),
+    "too large for float32": (
+        changed(replace_array("dense_1/dense_1/kernel:0", np.full((16, 8), 1e300))),
+        "NaN or infinite",
+    ),
     "text array": (
         changed(replace_array("dense_1/dense_1/kernel:0", np.full((16, 8), b"x"))),
         "not a plain array",
@@ -237,6 +241,10 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "activation": (
         changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "relu")),
         "activation 'relu'",
+    ),
+    "environment": (
+        changed(lambda f: f["keras_pendulum"].attrs.__setitem__("environment", "CartPole-v1")),
+        "belongs to 'CartPole-v1'",
     ),
     "gravity": (
         changed(lambda f: f["keras_pendulum"].attrs.__setitem__("gravity", np.nan)),

@@ -1,0 +1,1 @@
+"""The best possible returns that `keras_pendulum.optimum` made and reads."""

@@ -1,0 +1,81 @@
+"""README says what is so: its table, its figures, its commands and its links."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import keras_pendulum as kp
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+DEPARTURES: dict[str, list[float]] = json.loads(
+    (ROOT / "benchmarks" / "departures.json").read_text()
+)
+COMMANDS = sorted(
+    {match.strip() for match in re.findall(r"python -m keras_pendulum\.[^\n`#&]+", README)}
+)
+
+
+def table_of_departures() -> dict[str, list[str]]:
+    """Setting -> the other cells of its row."""
+    table = README.split("departures.json -->")[1].split("\n\n")[0].strip().splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[2:]]
+    return {row[0].strip("`"): row[1:] for row in rows}
+
+
+def summary(regrets: list[float]) -> str:
+    return f"mean {sum(regrets) / len(regrets):.1f}, worst {max(regrets):.1f}"
+
+
+def test_the_table_names_every_departure_and_no_other() -> None:
+    ours, theirs = kp.preset("reference"), kp.preset("original")
+    different = {
+        name
+        for name in kp.Config.__dataclass_fields__
+        if getattr(ours, name) != getattr(theirs, name) and name != "preset"
+    }
+    assert set(table_of_departures()) == different
+
+
+@pytest.mark.parametrize("name", table_of_departures())
+def test_a_row_has_the_presets_values_and_the_measured_regret(name: str) -> None:
+    original, reference, why, measured = table_of_departures()[name]
+    assert original.replace(" ", "") == str(getattr(kp.preset("original"), name))
+    assert reference.replace(" ", "") == str(getattr(kp.preset("reference"), name))
+    assert len(why) > 20
+    assert measured == summary(DEPARTURES[name])
+
+
+def test_the_text_beside_the_table_has_the_measured_regrets_too() -> None:
+    flowing = " ".join(README.split())
+    assert f"With all of them it is {summary(DEPARTURES['reference'])};" in flowing
+    assert f"the original's is {summary(DEPARTURES['original'])}." in flowing
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_a_command_has_the_flags_that_the_readme_gives_it(line: str) -> None:
+    _, _, module, *words = shlex.split(line)
+    shown = subprocess.run(
+        [sys.executable, "-m", module, "--help"], capture_output=True, text=True, check=True
+    ).stdout
+    for word in words:
+        if word.startswith("--"):
+            assert re.search(rf"{word}\b", shown), word
+
+
+def test_pictures_and_named_modules_exist() -> None:
+    for path in re.findall(r"\]\(([^)]+)\)", README):
+        assert (ROOT / path).is_file(), path
+    layout = README.split("## Reading the code")[1].split("\n\n")[1]
+    named = set(re.findall(r"`(\w+\.py)`", layout))
+    modules = {path.name for path in (ROOT / "keras_pendulum").glob("*.py")}
+    assert named <= modules
+    unnamed = {"__init__.py", "errors.py", "backend.py", "atomic_file.py", "display.py"}
+    assert modules - named == unnamed
