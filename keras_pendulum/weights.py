@@ -102,7 +102,7 @@ def find_weights(name: str) -> Path:
         WeightsError: there is no such file.
     """
     path = Path(name)
-    if path.exists():
+    if path.is_file():
         return path
     here = Path(__file__).parent
     # In a wheel the shipped weights lie inside the package, in a checkout beside it.
@@ -110,4 +110,5 @@ def find_weights(name: str) -> Path:
         for candidate in (folder / name, folder / f"{name}.h5"):
             if path.name == name and candidate.is_file():
                 return candidate
-    raise WeightsError(f"{name}: no such file; expected a weights file (.h5)")
+    problem = "not a file" if path.exists() else "no such file"
+    raise WeightsError(f"{name}: {problem}; expected a weights file (.h5)")

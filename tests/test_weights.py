@@ -299,3 +299,20 @@ def test_the_recorded_file_of_keras_2_loads() -> None:
     loaded = kp.load_weights(DATA / "pendulum_weight.keras2.h5")
     assert (loaded.hidden_units, loaded.action_count) == ((512, 256, 128), 41)
     assert loaded.origin.gravity is None
+
+
+def test_a_shipped_file_is_found_by_name_unless_a_file_of_that_name_is_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "reference").mkdir()  # a folder does not stand in the way
+    shipped = kp.find_weights("reference")
+    assert shipped == kp.find_weights("reference.h5")
+    assert kp.load_weights(shipped).origin == Origin("Pendulum-v1", 1.0, "reference", 0)
+    (tmp_path / "reference.h5").touch()
+    assert kp.find_weights("reference.h5") == Path("reference.h5")
+    with pytest.raises(kp.WeightsError, match="folder/reference: no such file"):
+        kp.find_weights("folder/reference")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(kp.WeightsError, match="folder: not a file"):
+        kp.find_weights("folder")
