@@ -52,7 +52,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     except UserError:
         raise
     # h5py tells of damage with whatever its C library met.
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+    except (OSError, RuntimeError, LookupError, ValueError, TypeError) as error:
         reason = re.sub(r"\s+", " ", str(error)).strip()
         raise WeightsError(f"{path}: cannot be read, the file is damaged ({reason})") from error
 

@@ -66,6 +66,8 @@ def load_weights(path: str | os.PathLike[str]) -> DQN:
         layers = layer_files.read_layers(file, path, inputs=3)  # cos θ, sin θ, θ̇
         activation, origin = _read_origin(file, path)
     kernels = layers[::2]
+    if kernels[-1].shape[1] < 2:
+        raise WeightsError(f"{path}: the network has one output; expected one for each torque")
     network = DQN(
         [kernel.shape[1] for kernel in kernels[:-1]],
         kernels[-1].shape[1],

@@ -211,6 +211,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "other data": (changed(lambda f: f.attrs.__delitem__("layer_names")), "no network weights"),
     "convolution": (other_model, "expected a kernel"),
     "cartpole": (lambda path: kp.save_weights(kp.DQN((8,), 2, observation_size=4), path), "4 inp"),
+    "one output": (lambda path: kp.save_weights(kp.DQN((8,), 1), path), "one output"),
     "wrong width": (
         changed(replace_array("dense_1/dense_1/kernel:0", np.zeros((17, 8), "f4"))),
         "takes 17 inputs; expected 16",
