@@ -59,6 +59,16 @@ def test_the_text_beside_the_table_has_the_measured_regrets_too() -> None:
     assert f"the original's is {summary(DEPARTURES['original'])}." in flowing
 
 
+def test_the_regrets_of_the_first_seeds_are_the_measured_ones() -> None:
+    found = re.search(
+        r"Regret: ([\d.]+)\n.*With `--seed 1` it is ([\d.]+) and\nwith `--seed 2` ([\d.]+)\.",
+        README,
+        re.DOTALL,
+    )
+    assert found is not None
+    assert [round(float(figure), 1) for figure in found.groups()] == DEPARTURES["reference"][:3]
+
+
 @pytest.mark.parametrize("line", COMMANDS)
 def test_a_command_has_the_flags_that_the_readme_gives_it(line: str) -> None:
     _, _, module, *words = shlex.split(line)
