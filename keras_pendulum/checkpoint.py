@@ -74,6 +74,12 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config) -> Run:
                     f"{path}: this run has {spec.name} {theirs}, not {ours}: resume it without "
                     "changing that, or start another run in another folder"
                 )
+        rows = layer_files.read_array(file["run/history"], path, finite=False)
+        if len(rows) > config.episodes:
+            raise ConfigError(
+                f"{path}: this run has {len(rows)} episodes behind it; episodes {config.episodes} "
+                "cannot be its end"
+            )
         run = Run(config)
         online = layer_files.read_layers(file, path, run.agent.online.observation_size)
         agent = {name: list(_arrays(file, name, path).values()) for name in ("target", "optimizer")}
@@ -81,7 +87,6 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config) -> Run:
         run.replay.set_state(_arrays(file, "replay", path), state["replay_added"])
         run.random.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]
-        rows = layer_files.read_array(file["run/history"], path, finite=False)
         run.history = [_record(row) for row in rows]
     return run
 

@@ -123,6 +123,8 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
     from keras_pendulum.evaluation import evaluate_policy, random_return
 
     last = result.history[-1]
+    if sys.stdout.isatty() and not result.finished:
+        print()  # the bar is still on its line
     state = "Trained" if result.finished else "Interrupted after"
     print(
         f"{state} {last.episode + 1} episodes ({last.environment_steps} steps, {last.updates} "

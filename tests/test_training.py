@@ -149,6 +149,14 @@ def test_resuming_with_other_settings_names_the_one_that_differs(tmp_path: Path)
         kp.train_dqn(other, tmp_path, resume=True)
 
 
+def test_a_run_cannot_be_made_shorter_than_it_is(tmp_path: Path) -> None:
+    kp.train_dqn(kp.preset("original", episodes=4, hidden_units=(8,)), tmp_path)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(kp.ConfigError, match="4 episodes behind it; episodes 3 cannot be its end"):
+        kp.train_dqn(kp.preset("original", episodes=3, hidden_units=(8,)), tmp_path, resume=True)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
 def test_a_file_with_weights_alone_is_no_run_to_resume(tmp_path: Path) -> None:
     kp.save_weights(kp.DQN((8,)), tmp_path / "pendulum_weight.h5")
     with pytest.raises(kp.WeightsError, match="weights alone"):
