@@ -57,7 +57,7 @@ class Agent:
     def update(self, batches: Transitions) -> NDArray[np.float32]:
         """Learns from batches [K, B, ...], one after the other; returns the losses [K].
 
-        One compiled call makes all K updates: a call each would cost three times as much.
+        One compiled call makes all K updates, because a call each costs more than its update.
         """
         losses = self._compiled_updates(Transitions(*map(tf.convert_to_tensor, batches)))
         self._greedy = GreedyPolicy(self.online)
@@ -98,5 +98,7 @@ class Agent:
         self.target.set_weights(state["target"])
         self.online.set_weights(online)
         for variable, value in zip(self.optimizer.variables, state["optimizer"], strict=True):
+            if value.shape != tuple(variable.shape):  # assign would stretch it
+                raise ValueError(f"{variable.name} has shape {value.shape}")
             variable.assign(value)
         self._greedy = GreedyPolicy(self.online)

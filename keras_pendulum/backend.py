@@ -9,7 +9,7 @@ from keras_pendulum.errors import UserError
 _ENVIRONMENT = {
     "KERAS_BACKEND": "tensorflow",
     # How many threads share a matrix product decides how its sums are rounded, and one rounded
-    # digit can part two runs: with one thread a run does not depend on the number of cores.
+    # digit can part two runs: with one thread learning does not depend on the number of cores.
     "TF_NUM_INTRAOP_THREADS": "1",
     # oneDNN picks its kernels by the processor and rounds differently with each.
     "TF_ENABLE_ONEDNN_OPTS": "0",

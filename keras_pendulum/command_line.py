@@ -51,6 +51,13 @@ def add_config_flags(parser: argparse.ArgumentParser, skip: Sequence[str] = ()) 
             )
 
 
+def name(text: str) -> str:
+    """A file's or folder's name from the command line; an empty one is a mistake of the shell's."""
+    if not text:
+        raise argparse.ArgumentTypeError("the name is empty")
+    return text
+
+
 def typed_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings that were typed, by field name; the preset is not one of them."""
     names = {spec.name for spec in fields(Config)} - {"preset"}

@@ -60,7 +60,7 @@ def learn_episodes(
         seed = random.seed if episode == 0 else None
         total = _run_episode(env, torques, agent, replay, epsilon, seed)
         loss = float("nan")
-        if episode > config.learning_starts and len(replay) >= config.batch_size:
+        if episode > config.learning_starts:
             positions = [
                 random.batch_positions(len(replay), config.batch_size)
                 for _ in range(config.updates_per_episode)

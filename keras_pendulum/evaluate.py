@@ -32,9 +32,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead")
     parser.add_argument("--render", action="store_true", help="show the episodes in a window")
-    parser.add_argument("--gif", metavar="FILE", help="film the first episode")
+    parser.add_argument("--gif", type=_gif, metavar="FILE.gif", help="film the first episode")
     arguments = parser.parse_args(argv)
     return run_command(lambda: _evaluate(arguments))
+
+
+def _gif(text: str) -> str:
+    # A slip of the shell's completion would else put the film in place of the weights.
+    if not text.endswith(".gif"):
+        raise argparse.ArgumentTypeError(f"{text!r} does not end in .gif")
+    return text
 
 
 def _evaluate(arguments: argparse.Namespace) -> int:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environment import make_environment
-from keras_pendulum.errors import ConfigError
 from keras_pendulum.network import DQN
 from keras_pendulum.optimum import optimal_return
 from keras_pendulum.policy import GreedyPolicy
+from keras_pendulum.presets import checked_setting
 from keras_pendulum.torque import TorqueGrid
 
 
@@ -103,14 +103,12 @@ def evaluate_policy(
 
     Raises ConfigError for numbers no evaluation can have.
     """
-    if not 1 <= episodes <= 1_000_000:
-        raise ConfigError(f"episodes is {episodes}; expected 1 to 1000000")
-    if not 0 <= seed <= 2**32 - 1 - episodes:
-        raise ConfigError(f"seed is {seed}; expected 0 to {2**32 - 1 - episodes}")
+    episodes = checked_setting("episodes", episodes)
+    seed = checked_setting("seed", seed)
+    checked_setting("seed", seed + episodes - 1)
     if gravity is None:
         gravity = 1.0 if network.origin.gravity is None else network.origin.gravity
-    if not 0 <= gravity <= 100:
-        raise ConfigError(f"gravity is {gravity}; expected 0 to 100 m/s²")
+    gravity = checked_setting("gravity", gravity)
     env = make_environment(network.origin.environment, gravity, render_mode)
     policy = GreedyPolicy(network)
     torques = TorqueGrid(network.action_count)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.errors import UserError, WeightsError
 
-_LARGEST_FILE = 2**30  # bytes; the largest checkpoint of a preset has 6 MB
+_LARGEST_FILE = 2**30  # bytes; a checkpoint of `reference` has 4.5 MB
 _LARGEST_LAYER = 8192  # units
 _Layer = tuple[str, list[Any]]  # its name and its datasets, kernel and bias
 
@@ -41,6 +41,9 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
             raise WeightsError(f"{path}: not a file; expected a weights file (.h5)")
         with open(file, "rb") as stream:
             head = stream.read(8)
+    except OSError as error:
+        raise WeightsError(f"{path}: cannot be read ({error.strerror})") from error
+    try:
         if not head:
             raise WeightsError(f"{path}: the file is empty; expected a weights file (.h5)")
         if head != b"\x89HDF\r\n\x1a\n":
@@ -51,8 +54,11 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
             yield content
     except UserError:
         raise
-    # h5py tells of damage with whatever its C library met.
-    except (OSError, RuntimeError, LookupError, ValueError, TypeError) as error:
+    # Damage shows as whatever h5py's C library or the first use of a wrong value meets.
+    except (
+        *(OSError, RuntimeError, LookupError, ValueError, TypeError),
+        *(AttributeError, ArithmeticError),
+    ) as error:
         reason = re.sub(r"\s+", " ", str(error)).strip()
         raise WeightsError(f"{path}: cannot be read, the file is damaged ({reason})") from error
 

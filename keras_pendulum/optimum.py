@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import logging
 import math
 import operator
 import os
@@ -45,6 +46,8 @@ from keras_pendulum.value_tables import (
     value_at,
     value_tables,
 )
+
+_log = logging.getLogger(__name__)
 
 COARSE_CELLS = 100  # small enough to keep the tables of all steps, 1.3 MB each
 CLIFF = 0.05  # where V is smooth, it and the attained return differ by less
@@ -81,6 +84,7 @@ def optimal_return(gravity: float = 1.0, seeds: Iterable[int] = range(100)) -> N
         missing = sorted(set(wanted) - known.keys())
         if missing:
             missing = sorted({*missing, *USUAL_SEEDS} - known.keys())
+            _log.warning("Solving for the best possible returns at g = %g, once: ~20 s", gravity)
             found = _best_return(gravity, _starts(missing))
             fresh = dict(zip(missing, found.tolist(), strict=True))
             known |= fresh

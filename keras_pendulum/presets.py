@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import math
+import numbers
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+from keras_pendulum.environment import STEPS_PER_EPISODE
 from keras_pendulum.errors import ConfigError
 
 
@@ -94,14 +96,13 @@ class Config:
 
     def __post_init__(self) -> None:
         for spec in fields(self):
-            value = getattr(self, spec.name)
-            _check(spec.name, spec.type, value, spec.metadata)
-            if spec.type == "float":  # 3 means 3.0
-                object.__setattr__(self, spec.name, float(value))
-        if self.batch_size > self.replay_capacity:
+            value = checked_setting(spec.name, getattr(self, spec.name))
+            object.__setattr__(self, spec.name, value)
+        stored = min(self.replay_capacity, (self.learning_starts + 2) * STEPS_PER_EPISODE)
+        if self.batch_size > stored:
             raise ConfigError(
-                f"batch_size {self.batch_size} is larger than replay_capacity "
-                f"{self.replay_capacity}: no batch could ever be drawn"
+                f"batch_size {self.batch_size} is larger than the {stored} transitions that "
+                "replay_capacity and learning_starts leave for the first batch"
             )
         if self.remembered_action == "truncated" and self.torque_count != 41:
             raise ConfigError(
@@ -115,23 +116,37 @@ class Config:
         return max(0, self.episodes - self.learning_starts - 1) * self.updates_per_episode
 
 
-def _check(name: str, kind: Any, value: Any, rule: Any) -> None:
-    if rule["choices"] is not None and value not in rule["choices"]:
-        raise ConfigError(f"{name} is {value!r}; expected one of {', '.join(rule['choices'])}")
-    if rule["low"] is None:
-        return
-    numbers = value if isinstance(value, tuple) else (value,)
-    if not 1 <= len(numbers) <= 16:
-        raise ConfigError(f"{name} has {len(numbers)} entries; expected 1 to 16")
-    for number in numbers:
-        if kind == "float" and not math.isfinite(number):
-            raise ConfigError(f"{name} is {number}; expected a finite number")
-        if kind != "float" and type(number) is not int:
-            raise ConfigError(f"{name} is {number!r}; expected a whole number")
-        if not rule["low"] <= number <= rule["high"]:
-            raise ConfigError(
-                f"{name} is {number}; expected a number from {rule['low']} to {rule['high']}"
-            )
+def checked_setting(name: str, value: Any) -> Any:
+    """`value` as the field `name` of Config keeps it: 3 for a float becomes 3.0.
+
+    Raises ConfigError for a value of another kind or outside the field's range.
+    """
+    spec = Config.__dataclass_fields__[name]
+    rule = spec.metadata
+    if spec.type == "str":
+        if not isinstance(value, str):
+            raise ConfigError(f"{name} is {value!r}; expected a name")
+        if rule["choices"] is not None and value not in rule["choices"]:
+            raise ConfigError(f"{name} is {value!r}; expected one of {', '.join(rule['choices'])}")
+        return value
+    if spec.type == "tuple[int, ...]":
+        if not isinstance(value, Sequence) or not 1 <= len(value) <= 16:
+            raise ConfigError(f"{name} is {value!r}; expected 1 to 16 whole numbers")
+        return tuple(_checked_number(name, int, number, rule) for number in value)
+    return _checked_number(name, float if spec.type == "float" else int, value, rule)
+
+
+def _checked_number(name: str, kind: type, value: Any, rule: Any) -> Any:
+    wanted = numbers.Real if kind is float else numbers.Integral
+    if isinstance(value, bool) or not isinstance(value, wanted):
+        word = "a number" if kind is float else "a whole number"
+        raise ConfigError(f"{name} is {value!r}; expected {word}")
+    number = kind(value)
+    if not rule["low"] <= number <= rule["high"]:  # written so that NaN fails too
+        raise ConfigError(
+            f"{name} is {number}; expected a number from {rule['low']} to {rule['high']}"
+        )
+    return number
 
 
 _REFERENCE = Config()

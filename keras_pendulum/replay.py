@@ -72,8 +72,14 @@ class ReplayBuffer:
         return self.at(np.arange(len(self)))._asdict()
 
     def set_state(self, state: dict[str, NDArray[Any]], added: int) -> None:
-        """Takes the transitions of `get_state`; `added` is how many were ever added."""
-        stored = len(state["action"])
+        """Takes the transitions of `get_state`; `added` is how many were ever added.
+
+        Raises ValueError when they are not what a buffer of this capacity can hold.
+        """
+        stored = min(added, self.capacity)
+        for name, array in self._arrays._asdict().items():
+            if state[name].shape != (stored, *array.shape[1:]) or added < 0:
+                raise ValueError(f"{name} of {added} transitions has shape {state[name].shape}")
         self._added = added
         slots = (added - stored + np.arange(stored)) % self.capacity
         for name, array in self._arrays._asdict().items():

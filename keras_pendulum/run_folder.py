@@ -54,7 +54,10 @@ class RunFolder:
 
         A picture of what was here before goes. Raises UserError when the folder cannot be written.
         """
-        self.picture.unlink(missing_ok=True)
+        try:
+            self.picture.unlink(missing_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot replace {self.picture}: {error.strerror}") from error
         write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
         lines = [",".join(_COLUMNS), *map(_row, history)]
         write_atomically(self.history, "".join(line + "\n" for line in lines).encode())

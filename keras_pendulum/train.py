@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import math
+import shlex
 import signal
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +17,7 @@ from keras_pendulum.backend import require_tensorflow
 from keras_pendulum.command_line import (
     OneLineParser,
     add_config_flags,
+    name,
     run_command,
     typed_settings,
 )
@@ -39,9 +39,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         description="Train a DQN to hold a pendulum up, and say how good it has become.",
         epilog="Ctrl-C saves a checkpoint; --resume goes on from it.",
     )
-    parser.add_argument("--preset", default=None, help=f"{', '.join(PRESETS)} [reference]")
-    parser.add_argument("--init", metavar="FILE.h5", help="start from these weights")
-    parser.add_argument("--out", metavar="DIR", help="folder of the run [runs/PRESET-seedN]")
+    parser.add_argument("--preset", type=name, help=f"{', '.join(PRESETS)} [reference]")
+    parser.add_argument("--init", type=name, metavar="FILE.h5", help="start from these weights")
+    parser.add_argument(
+        "--out", type=name, metavar="DIR", help="folder of the run [runs/PRESET-seedN]"
+    )
     rerun = parser.add_mutually_exclusive_group()
     rerun.add_argument("--resume", action="store_true", help="go on from DIR's last checkpoint")
     rerun.add_argument("--overwrite", action="store_true", help="replace the run that DIR holds")
@@ -70,34 +72,43 @@ def _train(arguments: argparse.Namespace) -> int:
     init = load_weights(find_weights(arguments.init)) if arguments.init else None
 
     started = time.perf_counter()
-    with _interrupt_asks_to_stop() as interrupted:
+    with _Interrupt(config) as interrupt:
         result = train_dqn(
             config,
             out,
             init=init,
             overwrite=arguments.overwrite,
             resume=arguments.resume,
-            listeners=[_progress(config)],
-            should_stop=interrupted.is_set,
+            listeners=[_progress(config), interrupt.listen],
+            should_stop=lambda: interrupt.asked,
         )
     _print_summary(result, RunFolder(out), time.perf_counter() - started)
     return 0 if result.finished else 130
 
 
-@contextlib.contextmanager
-def _interrupt_asks_to_stop() -> Iterator[threading.Event]:
-    """The first Ctrl-C sets the event, so that the episode ends in order; the second one kills."""
-    asked = threading.Event()
+class _Interrupt:
+    """The first Ctrl-C asks the run to stop after its episode; the next one, or one after the
+    last episode, ends the command at once.
+    """
 
-    def ask(signum: int, frame: object) -> None:
-        asked.set()
-        signal.signal(signal.SIGINT, before)
+    def __init__(self, config: Config) -> None:
+        self.asked = False
+        self._last = config.episodes - 1
 
-    before = signal.signal(signal.SIGINT, ask)
-    try:
-        yield asked
-    finally:
-        signal.signal(signal.SIGINT, before)
+    def __enter__(self) -> _Interrupt:
+        self._before = signal.signal(signal.SIGINT, self._ask)
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def listen(self, record: EpisodeRecord) -> None:
+        if record.episode == self._last:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _ask(self, signum: int, frame: object) -> None:
+        self.asked = True
+        signal.signal(signal.SIGINT, self._before)
 
 
 def _progress(config: Config) -> Callable[[EpisodeRecord], None]:
@@ -106,15 +117,21 @@ def _progress(config: Config) -> Callable[[EpisodeRecord], None]:
         return lambda record: print(record.line(), flush=True)
     import keras
 
-    bar = keras.utils.Progbar(
-        config.episodes, unit_name="episode", stateful_metrics=["return", "epsilon", "loss"]
-    )
+    bar: keras.utils.Progbar | None = None
+    first = 0
 
     def show(record: EpisodeRecord) -> None:
+        nonlocal bar, first
+        if bar is None:  # now it is known where a resumed run goes on
+            first = record.episode
+            names = ["return", "epsilon", "loss"]
+            bar = keras.utils.Progbar(
+                config.episodes - first, unit_name="episode", stateful_metrics=names
+            )
         values = [("return", record.episode_return), ("epsilon", record.epsilon)]
         if not math.isnan(record.loss):
             values.append(("loss", record.loss))
-        bar.update(record.episode + 1, values)
+        bar.update(record.episode + 1 - first, values)
 
     return show
 
@@ -138,7 +155,9 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
     saved = ", ".join(file.name for file in folder.files if file.exists())
     print(f"Saved in {folder.path}: {saved}")
     if not result.finished:
-        print(f"Go on: python -m keras_pendulum.train --resume --out {folder.path}")
+        print(
+            f"Go on: python -m keras_pendulum.train --resume --out {shlex.quote(str(folder.path))}"
+        )
 
 
 if __name__ == "__main__":

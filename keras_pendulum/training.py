@@ -62,14 +62,24 @@ def train_dqn(
             raise UserError("resume needs the folder of the run to go on with")
         run = load_checkpoint(folder.weights, config)
     else:
+        run = Run(config, init)
         if folder is not None:
             folder.claim(overwrite)
-        run = Run(config, init)
+            # Before the other files, so that no policy of another run lies beside them, and so
+            # that there is a run to resume from the start.
+            save_checkpoint(run, folder.weights)
     if folder is not None:
         folder.begin(config, run.history)
     finished = True
+    updates = run.history[-1].updates if run.history else 0
     for record in run.episodes():
-        _check_learning(record, config)
+        if record.updates > updates and not math.isfinite(record.loss):
+            # Before a checkpoint could replace a good one.
+            raise UserError(
+                f"episode {record.episode}: the loss is {record.loss}, learning has diverged; try "
+                "a smaller learning_rate"
+            )
+        updates = record.updates
         if folder is not None:
             folder.append(record)
             if record.episode % config.save_every == 0:
@@ -86,13 +96,3 @@ def train_dqn(
             chance = random_return(config.environment, config.gravity)
             write_atomically(folder.picture, pictures.learning_curve(run.history, best, chance))
     return TrainingResult(run.agent.online, run.history, finished)
-
-
-def _check_learning(record: EpisodeRecord, config: Config) -> None:
-    """Stops a run that has diverged before its checkpoint replaces a good one."""
-    learned = record.episode > config.learning_starts
-    if learned and not math.isfinite(record.loss) and record.updates:
-        raise UserError(
-            f"episode {record.episode}: the loss is {record.loss}, learning has diverged; try a "
-            "smaller learning_rate"
-        )

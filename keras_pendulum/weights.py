@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from keras_pendulum import __version__, layer_files
 from keras_pendulum.atomic_file import write_atomically
-from keras_pendulum.errors import WeightsError
+from keras_pendulum.errors import ConfigError, WeightsError
 from keras_pendulum.network import DQN, Origin
+from keras_pendulum.presets import checked_setting
 
 _ORIGIN = "keras_pendulum"  # our group beside the layers; Keras ignores it
 
@@ -87,11 +88,14 @@ def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Or
     if environment != "Pendulum-v1":
         raise WeightsError(f"{path}: belongs to {environment!r}; expected 'Pendulum-v1'")
     gravity = about.get("gravity")
-    if gravity is not None and not 0 <= gravity <= 100:
-        raise WeightsError(f"{path}: records a gravity of {gravity}; expected 0 to 100 m/s²")
+    if gravity is not None:
+        try:
+            gravity = checked_setting("gravity", gravity)
+        except ConfigError as error:
+            raise WeightsError(f"{path}: the recorded {error}") from error
     return activation, Origin(
         environment=environment,
-        gravity=None if gravity is None else float(gravity),
+        gravity=gravity,
         preset=str(about["preset"]) if "preset" in about else None,
         seed=int(about["seed"]) if "seed" in about else None,
     )
@@ -104,8 +108,11 @@ def find_weights(name: str) -> Path:
         WeightsError: there is no such file.
     """
     path = Path(name)
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+    except OSError as error:  # a name that no file can have
+        raise WeightsError(f"{name}: {error.strerror}; expected a weights file (.h5)") from error
     here = Path(__file__).parent
     # In a wheel the shipped weights lie inside the package, in a checkout beside it.
     for folder in (here / "shipped_weights", here.parent / "weights"):

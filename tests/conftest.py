@@ -14,6 +14,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
+from keras_pendulum.replay import ReplayBuffer
+from keras_pendulum.torque import TorqueGrid
+
 DATA = Path(__file__).parent / "data"
 Recorded = dict[str, NDArray[Any]]
 Command = Callable[..., subprocess.CompletedProcess[str]]
@@ -24,6 +28,21 @@ def recorded() -> Recorded:
     """The complete run of the original under Keras 2.15, every draw seeded by 1."""
     with np.load(DATA / "original_run_seed1.npz") as arrays:
         return dict(arrays)
+
+
+@pytest.fixture(scope="session")
+def recorded_memory(recorded: Recorded) -> ReplayBuffer:
+    """Every transition of the recorded run, at its step number: its actions, played again."""
+    memory = ReplayBuffer(len(recorded["action_index"]))
+    env = make_environment("Pendulum-v1", gravity=1.0)
+    torques = TorqueGrid(41)
+    for step, action in enumerate(recorded["action_index"].tolist()):
+        if step % STEPS_PER_EPISODE == 0:
+            observation, _ = env.reset(seed=1 if step == 0 else None)
+        following, reward, terminated, _, _ = env.step(torques.torque(action))
+        memory.add(observation, action, float(reward), following, terminated)
+        observation = following
+    return memory
 
 
 @pytest.fixture(scope="session")

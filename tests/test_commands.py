@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -44,8 +45,10 @@ def test_every_setting_is_a_flag_with_a_help_text() -> None:
         check=True,
         env={**os.environ, "COLUMNS": "300"},
     )
-    for name in kp.Config.__dataclass_fields__:
-        assert f"--{name.replace('_', '-')}" in done.stdout
+    told = " ".join(done.stdout.split())
+    for name, spec in kp.Config.__dataclass_fields__.items():
+        assert f"--{name.replace('_', '-')}" in told
+        assert name == "preset" or spec.metadata["meaning"] in told
 
 
 def test_train_prints_a_line_an_episode_and_says_how_good_it_is(
@@ -57,7 +60,9 @@ def test_train_prints_a_line_an_episode_and_says_how_good_it_is(
     lines = done.stdout.splitlines()
     assert [line.split(",")[0] for line in lines[:3]] == [f"Episode: {i}" for i in range(3)]
     assert "best possible" in done.stdout.lower()
+    assert "Greedy on 100 fixed starts" in done.stdout
     assert "Regret: " in done.stdout
+    assert "random torque on the same starts: -920.87" in done.stdout
     folder = tmp_path / "runs" / "reference-seed4"
     assert (folder / "pendulum_weight.h5").exists()
     assert kp.load_weights(folder / "pendulum_weight.h5").hidden_units == (16, 8)
@@ -77,7 +82,7 @@ def test_train_prints_a_line_an_episode_and_says_how_good_it_is(
 
 def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     controller, terminal = pty.openpty()
-    arguments = ["--preset", "original", "--episodes", "3", "--hidden-units", "8"]
+    arguments = ["--preset", "original", "--episodes", "43", "--hidden-units", "8"]
     with subprocess.Popen(
         command_line("train", *arguments), cwd=tmp_path, stdout=terminal, close_fds=True
     ) as process:
@@ -91,8 +96,10 @@ def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     os.close(controller)
     assert process.returncode == 0
     text = output.decode()
-    assert "3/3" in text
+    assert "43/43" in text
     assert "return: " in text
+    assert "loss: " in text
+    assert re.search(r"\d[mu]?s/episode", text)
     assert "epsilon: " in text
     assert "Episode: " not in text
     assert "Regret: " in text
@@ -153,6 +160,10 @@ WRONG = [
     (["train", "--colour", "red"], "unrecognized arguments: --colour red"),
     (["train", "--resume", "--overwrite"], "not allowed with"),
     (["train", "--resume"], "no such file"),
+    (["train", "--out", ""], "the name is empty"),
+    (["train", "--preset", ""], "the name is empty"),
+    (["train", "--init", "n" * 300], "File name too long"),
+    (["train", "--out", "n" * 300], "File name too long"),
     (["train", "--init", "missing.h5"], "missing.h5: no such file"),
     (["train", "--init", "text.h5"], "text.h5: not an HDF5 file"),
     (["train", "--init", RECORDED, "--hidden-units", "8"], "layers 512-256-128-41"),
@@ -161,6 +172,8 @@ WRONG = [
     (["evaluate"], "the following arguments are required: WEIGHTS.h5"),
     (["evaluate", "missing.h5"], "missing.h5: no such file"),
     (["evaluate", "text.h5"], "text.h5: not an HDF5 file"),
+    (["evaluate", "n" * 300], "File name too long"),
+    (["evaluate", "text.h5", "--gif", "text.h5"], "does not end in .gif"),
     (["evaluate", RECORDED, "--episodes", "0"], "episodes is 0"),
     (["evaluate", RECORDED, "--seed", "-1"], "seed is -1"),
     (["evaluate", RECORDED, "--gravity", "nan"], "gravity is nan"),
@@ -190,7 +203,7 @@ def test_a_mistake_gets_one_clear_line_and_exit_status_2(
     assert printed.err.startswith("error: ")
     assert printed.err.count("\n") == 1
     assert message in printed.err
-    assert [file.name for file in tmp_path.iterdir() if file.is_file()] == ["text.h5"]
+    assert [file.name for file in tmp_path.iterdir()] == ["text.h5"]
     assert (tmp_path / "text.h5").read_text() == "not weights"
 
 

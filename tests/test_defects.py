@@ -11,12 +11,10 @@ import gymnasium
 import keras
 import numpy as np
 import pytest
-from conftest import Recorded
-from test_recorded_run import recorded_transitions
 
 import keras_pendulum as kp
 from keras_pendulum.defects import TruncatingTorqueGrid, truncated_index
-from keras_pendulum.replay import Transitions
+from keras_pendulum.replay import ReplayBuffer, Transitions
 from keras_pendulum.run import Run, make_torques
 from keras_pendulum.torque import TorqueGrid
 
@@ -88,7 +86,7 @@ def test_copying_a_networks_weights_to_itself_is_no_refresh() -> None:
 
 
 def test_update_starvation_459_updates_are_not_enough_even_on_good_data(
-    recorded: Recorded,
+    recorded_memory: ReplayBuffer,
 ) -> None:
     """All else as in `reference`: 459 updates leave a policy worse than chance, 2000 do not.
 
@@ -97,14 +95,13 @@ def test_update_starvation_459_updates_are_not_enough_even_on_good_data(
     """
     assert kp.preset("original").total_updates == 459
     assert kp.preset("reference").total_updates == 30 * 459
-    transitions = recorded_transitions(recorded)
     hanging = np.array([[-1, 0, 0]], np.float32)
     random = np.random.RandomState(0)
     agent = Run(kp.preset("reference")).agent
 
     def learn(updates: int) -> tuple[float, float]:
         positions = random.randint(0, 100_000, (updates, 32))
-        agent.update(Transitions(*(each[positions] for each in transitions)))
+        agent.update(recorded_memory.at(positions))
         value = float(agent.online(hanging).numpy().max())
         return value, kp.evaluate_policy(agent.online, episodes=10).mean_return
 

@@ -57,6 +57,18 @@ def test_gravity_is_the_networks_own_else_1() -> None:
     assert kp.evaluate_policy(heavy, 1).returns != kp.evaluate_policy(heavy, 1, gravity=1).returns
 
 
+def test_the_best_possible_returns_are_those_of_the_same_starts_and_gravity() -> None:
+    score = kp.evaluate_policy(kp.DQN((8,)), 3, 5, gravity=10)
+    np.testing.assert_array_equal(score.optimal_returns, kp.optimal_return(10, [5, 6, 7]))
+
+
+def test_the_last_seeds_there_are_can_be_evaluated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "keras_pendulum.evaluation.optimal_return", lambda gravity, seeds: np.zeros(len(seeds))
+    )
+    assert len(kp.evaluate_policy(kp.DQN((8,)), 2, 2**32 - 2).returns) == 2
+
+
 def test_no_policy_beats_the_best_possible_return() -> None:
     network = kp.load_weights(Path(__file__).parent / "data" / "pendulum_weight.keras2.h5")
     score = kp.evaluate_policy(network, 20)
@@ -68,7 +80,9 @@ def test_random_torque_is_as_bad_as_published() -> None:
     assert random_return("Pendulum-v1", 1.0) == pytest.approx(-909, rel=0.1)
 
 
-@pytest.mark.parametrize(("episodes", "seed"), [(0, 0), (-1, 0), (10**9, 0), (1, -1), (1, 2**32)])
+@pytest.mark.parametrize(
+    ("episodes", "seed"), [(0, 0), (-1, 0), (10**9, 0), (1, -1), (1, 2**32), (2, 2**32 - 1)]
+)
 def test_numbers_that_no_evaluation_can_have(episodes: int, seed: int) -> None:
     with pytest.raises(kp.ConfigError, match="expected"):
         kp.evaluate_policy(kp.DQN((8,)), episodes, seed)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import numpy as np
 import pytest
 
 import keras_pendulum as kp
@@ -53,6 +54,15 @@ def test_an_unknown_preset_is_told_with_the_known_ones(name: str) -> None:
         kp.preset(name)
 
 
+def test_numbers_of_numpy_and_lists_are_as_good() -> None:
+    changed = kp.preset(
+        "reference", episodes=np.int64(9), gravity=np.float32(2), hidden_units=[8, np.int32(4)]
+    )
+    plain = kp.preset("reference", episodes=9, gravity=2, hidden_units=(8, 4))
+    assert changed == plain
+    assert (type(changed.episodes), type(changed.gravity)) == (int, float)
+
+
 def test_an_unknown_setting_is_named() -> None:
     with pytest.raises(kp.ConfigError, match="unknown setting learning_speed"):
         kp.preset("reference", learning_speed=1)
@@ -77,7 +87,10 @@ def test_an_unknown_setting_is_named() -> None:
         *[("learning_rate_schedule", value) for value in ("linear",)],
         *[("environment", value) for value in ("CartPole-v1", "Nonsense-v0")],
         *[("save_every", value) for value in (0, -1)],
-        *[("episodes", value) for value in (1.5, True, "12", None)],
+        *[("episodes", value) for value in (1.5, True, "12", None, (5,))],
+        *[("gravity", value) for value in (True, "1", None, (0.5,))],
+        *[("hidden_units", value) for value in (8, "8", None, (8.5,), (8, "8"))],
+        *[("target_update", value) for value in (5, None, ("soft",))],
     ],
 )
 def test_a_value_that_no_run_can_have_is_named(name: str, value: Any) -> None:
@@ -86,8 +99,14 @@ def test_a_value_that_no_run_can_have_is_named(name: str, value: Any) -> None:
 
 
 def test_a_batch_larger_than_the_buffer_is_refused() -> None:
-    with pytest.raises(kp.ConfigError, match="no batch could ever be drawn"):
+    with pytest.raises(kp.ConfigError, match="batch_size 64 is larger than the 50 transitions"):
         kp.preset("reference", batch_size=64, replay_capacity=50)
+
+
+def test_a_batch_larger_than_what_is_stored_at_the_first_update_is_refused() -> None:
+    kp.preset("reference", batch_size=400, learning_starts=0)
+    with pytest.raises(kp.ConfigError, match="batch_size 401 is larger than the 400 transitions"):
+        kp.preset("reference", batch_size=401, learning_starts=0)
 
 
 def test_presets_are_listed_by_their_own_name() -> None:

@@ -8,8 +8,7 @@ import numpy as np
 from conftest import Command, Recorded
 
 import keras_pendulum as kp
-from keras_pendulum.environment import make_environment
-from keras_pendulum.replay import Transitions
+from keras_pendulum.replay import ReplayBuffer
 from keras_pendulum.run import Run
 
 STRICT_EPISODES = 100  # later ones may part on another processor, by a last digit
@@ -61,15 +60,11 @@ def test_first_100_episodes_repeat_every_action_batch_line_and_loss(
 
 
 def test_all_459_updates_on_the_recorded_batches_end_at_the_recorded_weights(
-    recorded: Recorded, recorded_initial_weights: Path
+    recorded: Recorded, recorded_memory: ReplayBuffer, recorded_initial_weights: Path
 ) -> None:
-    transitions = recorded_transitions(recorded)
     agent = Run(kp.preset("original", seed=1), kp.load_weights(recorded_initial_weights)).agent
 
-    losses = [
-        agent.update(Transitions(*(each[batch[np.newaxis]] for each in transitions)))[0]
-        for batch in recorded["batch"]
-    ]
+    losses = [agent.update(recorded_memory.at(batch[np.newaxis]))[0] for batch in recorded["batch"]]
 
     np.testing.assert_allclose(losses, recorded["loss"], rtol=1e-5)
     for i, weights in enumerate(agent.online.get_weights()):
@@ -93,19 +88,3 @@ def test_the_recorded_weights_file_gives_the_recorded_q_values(recorded: Recorde
     np.testing.assert_allclose(
         network(recorded["probe_observations"]), recorded["probe_q_values"], rtol=0, atol=1e-5
     )
-
-
-def recorded_transitions(recorded: Recorded) -> Transitions:
-    """All 100 000 transitions of the recorded run: its actions, played again."""
-    env = make_environment("Pendulum-v1", 1.0)
-    grid = np.linspace(-2, 2, 41)
-    rows = []
-    for step, index in enumerate(recorded["action_index"]):
-        if step % 200 == 0:
-            observation, _ = env.reset(seed=1 if step == 0 else None)
-        following, reward, terminated, _, _ = env.step(grid[index : index + 1])
-        rows.append((observation, index, reward, following, terminated))
-        observation = following
-    dtypes = (np.float32, np.int32, np.float32, np.float32, bool)
-    columns = zip(*rows, strict=True)
-    return Transitions(*map(np.array, columns, dtypes))

@@ -16,34 +16,16 @@ import torch_agent
 from conftest import Recorded
 from numpy.typing import NDArray
 
-from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
 from keras_pendulum.network import DQN
 from keras_pendulum.presets import Config, preset
 from keras_pendulum.q_learning import mean_squared_error, td_target
 from keras_pendulum.randomness import RandomSource
 from keras_pendulum.replay import ReplayBuffer, Transitions
 from keras_pendulum.run import make_agent
-from keras_pendulum.torque import TorqueGrid
 
 torch.set_num_threads(1)  # two threads would share a sum differently from one run to the next
 
 Weights = list[NDArray[np.float32]]
-
-
-@pytest.fixture(scope="module")
-def memory(recorded: Recorded) -> ReplayBuffer:
-    """Every transition of the recorded run, at its step number."""
-    actions = recorded["action_index"].tolist()
-    memory = ReplayBuffer(len(actions))
-    env = make_environment("Pendulum-v1", gravity=1.0)
-    torques = TorqueGrid(41)
-    for step, action in enumerate(actions):
-        if step % STEPS_PER_EPISODE == 0:
-            observation, _ = env.reset(seed=1 if step == 0 else None)
-        following, reward, terminated, _, _ = env.step(torques.torque(action))
-        memory.add(observation, action, float(reward), following, terminated)
-        observation = following
-    return memory
 
 
 def torch_batch(batch: Transitions) -> torch_agent.Batch:
@@ -84,10 +66,10 @@ def recorded_weights(recorded: Recorded, when: str) -> Weights:
     ids=["original", "reference", "hard target"],
 )
 def test_200_updates_give_the_same_losses_and_weights(
-    config: Config, terminated_share: float, memory: ReplayBuffer
+    config: Config, terminated_share: float, recorded_memory: ReplayBuffer
 ) -> None:
     random = np.random.default_rng(1)
-    batches = memory.at(random.integers(len(memory), size=(20, 10, 32)))
+    batches = recorded_memory.at(random.integers(len(recorded_memory), size=(20, 10, 32)))
     # The pendulum never terminates, so some transitions are made to.
     terminated = random.random(batches.terminated.shape) < terminated_share
     batches = batches._replace(terminated=terminated)
@@ -108,29 +90,29 @@ def test_200_updates_give_the_same_losses_and_weights(
 
 def learn_recorded_batches(
     recorded: Recorded,
-    memory: ReplayBuffer,
+    recorded_memory: ReplayBuffer,
     epsilon: Callable[[int], float] = torch_agent.keras_epsilon,
 ) -> tuple[list[float], Weights]:
     """Losses [459] and final weights of the recorded run's updates, made in PyTorch."""
     initial = recorded_weights(recorded, "initial")
     agent = torch_agent.Agent(initial, 0.9, torch_agent.constant_rate(1e-3), epsilon=epsilon)
-    losses = [agent.update(torch_batch(memory.at(steps))) for steps in recorded["batch"]]
+    losses = [agent.update(torch_batch(recorded_memory.at(steps))) for steps in recorded["batch"]]
     return losses, torch_agent.to_keras(agent.online)
 
 
 def test_torch_follows_the_recorded_run_of_the_original(
-    recorded: Recorded, memory: ReplayBuffer
+    recorded: Recorded, recorded_memory: ReplayBuffer
 ) -> None:
-    losses, weights = learn_recorded_batches(recorded, memory)
+    losses, weights = learn_recorded_batches(recorded, recorded_memory)
     # Measured: 8.0e-6 in the losses (0.006 to 1.03), 2.4e-5 in the weights, which move by 0.2.
     np.testing.assert_allclose(losses, recorded["loss"], rtol=0, atol=2.5e-5)
     assert gap(weights, recorded_weights(recorded, "final")) < 5e-5
 
 
 def test_torch_with_its_own_place_of_epsilon_does_not_follow(
-    recorded: Recorded, memory: ReplayBuffer
+    recorded: Recorded, recorded_memory: ReplayBuffer
 ) -> None:
-    losses, weights = learn_recorded_batches(recorded, memory, epsilon=lambda step: 1e-7)
+    losses, weights = learn_recorded_batches(recorded, recorded_memory, epsilon=lambda step: 1e-7)
     # Measured: 6.9e-4 in the first 20 losses, 0.026 in the final weights.
     assert abs(losses - recorded["loss"])[:20].max() > 1e-4
     assert gap(weights, recorded_weights(recorded, "final")) > 1e-3

@@ -5,9 +5,11 @@ import json
 import os
 import signal
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import matplotlib.image
 import numpy as np
 import pytest
@@ -38,6 +40,14 @@ def assert_same(ours: kp.TrainingResult, theirs: kp.TrainingResult) -> None:
 def test_the_same_seed_twice_is_the_same_run_bit_for_bit(name: str) -> None:
     config = kp.preset(name, **SHORT)
     assert_same(kp.train_dqn(config), kp.train_dqn(config))
+
+
+def test_another_seed_starts_from_other_weights_and_another_state() -> None:
+    first, second = (Run(kp.preset("original", seed=seed, hidden_units=(8,))) for seed in (0, 1))
+    assert (first.agent.online.get_weights()[0] != second.agent.online.get_weights()[0]).all()
+    for run in (first, second):
+        next(run.episodes())
+    assert (first.replay.at([0]).observation != second.replay.at([0]).observation).all()
 
 
 def test_another_seed_is_another_run() -> None:
@@ -117,14 +127,24 @@ def test_a_stopped_and_resumed_run_ends_like_one_never_stopped(name: str, tmp_pa
     # A small buffer, so that its ring has wrapped round by then.
     config = kp.preset(name, episodes=50, replay_capacity=3000)
     whole = kp.train_dqn(config, tmp_path / "whole")
-    for stop_after in (5, 44):
+    for last, updates in ((5, 0), (45, 5 * config.updates_per_episode)):
+        reached: list[int] = []
+
+        def listen(record: Any, reached: list[int] = reached) -> None:
+            reached.append(record.episode)
+
+        def should_stop(last: int = last, reached: list[int] = reached) -> bool:
+            return reached[-1] == last
+
         stopped = kp.train_dqn(
             config,
             tmp_path / "parts",
-            resume=stop_after > 5,
-            should_stop=iter([False] * (stop_after if stop_after == 5 else 30) + [True]).__next__,
+            resume=last > 5,
+            listeners=[listen],
+            should_stop=should_stop,
         )
         assert not stopped.finished
+        assert stopped.history[-1].updates == updates
     resumed = kp.train_dqn(config, tmp_path / "parts", resume=True)
     assert resumed.finished
     assert_same(resumed, whole)
@@ -142,11 +162,96 @@ def test_a_finished_run_can_be_made_longer(tmp_path: Path) -> None:
     assert_same(kp.train_dqn(longer, tmp_path, resume=True), kp.train_dqn(longer))
 
 
+def test_a_longer_run_of_an_annealed_rate_anneals_over_its_new_length(tmp_path: Path) -> None:
+    config = kp.preset("reference", hidden_units=(8,), episodes=44)
+    end = kp.train_dqn(config, tmp_path).network.get_weights()
+    longer = kp.preset("reference", hidden_units=(8,), episodes=48)
+    result = kp.train_dqn(longer, tmp_path, resume=True)
+    assert result.history[-1].updates == longer.total_updates
+    assert any(
+        (ours != theirs).any()
+        for ours, theirs in zip(result.network.get_weights(), end, strict=True)
+    )
+
+
 def test_resuming_with_other_settings_names_the_one_that_differs(tmp_path: Path) -> None:
     kp.train_dqn(kp.preset("original", episodes=2, hidden_units=(8,)), tmp_path)
     other = kp.preset("original", episodes=2, hidden_units=(8,), gravity=3.0)
     with pytest.raises(kp.ConfigError, match=r"this run has gravity 1\.0, not 3\.0"):
         kp.train_dqn(other, tmp_path, resume=True)
+
+
+def test_the_picture_shows_the_best_possible_above_chance(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[float, float]] = []
+
+    def draw(history: object, best_return: float, random_return: float) -> bytes:
+        drawn.append((best_return, random_return))
+        return b"a picture"
+
+    monkeypatch.setattr("keras_pendulum.pictures.learning_curve", draw)
+    kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
+    assert (tmp_path / "rewards.png").read_bytes() == b"a picture"
+    assert len(drawn) == 1
+    best, chance = drawn[0]
+    assert best == pytest.approx(-40.69, abs=0.05)
+    assert chance == pytest.approx(-909, rel=0.1)
+
+
+def test_a_run_killed_before_its_first_episode_ends_can_be_resumed(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=3, hidden_units=(8,))
+
+    class KilledError(Exception):
+        pass
+
+    def kill(record: object) -> None:
+        raise KilledError
+
+    kp.train_dqn(kp.preset("original", seed=9, episodes=2, hidden_units=(8,)), tmp_path)
+    with pytest.raises(KilledError):
+        kp.train_dqn(config, tmp_path, overwrite=True, listeners=[kill])
+    assert not (tmp_path / "rewards.png").exists()  # it was the other run's
+    assert load_config(tmp_path / "pendulum_weight.h5").seed == 0
+    assert_same(kp.train_dqn(config, tmp_path, resume=True), kp.train_dqn(config))
+
+
+CHECKPOINT_DAMAGE: dict[str, Callable[[h5py.File], None]] = {
+    "no state": lambda file: file["run"].__delitem__("state"),
+    "no history": lambda file: file["run"].__delitem__("history"),
+    "state is a group": lambda file: replaced(file, "run/state", None),
+    "replay is an array": lambda file: replaced(file, "replay", np.zeros(3)),
+    "one reward for all": lambda file: replaced(file, "replay/reward", np.zeros(1, np.float32)),
+    "no rewards": lambda file: file["replay"].__delitem__("reward"),
+    "one number as optimizer state": lambda file: replaced(file, "optimizer/003", np.float32(1)),
+    "too few optimizer variables": lambda file: file["optimizer"].__delitem__("003"),
+    "other target": lambda file: replaced(file, "target/000", np.zeros((3, 9), np.float32)),
+    "not JSON": lambda file: replaced(file, "run/state", np.zeros(50, np.uint8)),
+    "NaN in the optimizer": lambda file: replaced(
+        file, "optimizer/003", np.full((3, 8), np.nan, np.float32)
+    ),
+}
+
+
+def replaced(file: h5py.File, name: str, array: Any) -> None:
+    del file[name]
+    if array is None:
+        file.create_group(name)
+    else:
+        file[name] = array
+
+
+@pytest.mark.parametrize("kind", CHECKPOINT_DAMAGE)
+def test_a_damaged_checkpoint_is_told_in_one_line_and_left_alone(kind: str, tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    with h5py.File(tmp_path / "pendulum_weight.h5", "r+") as file:
+        CHECKPOINT_DAMAGE[kind](file)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(kp.WeightsError) as caught:
+        kp.train_dqn(config, tmp_path, resume=True)
+    assert "\n" not in str(caught.value)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
 def test_a_run_cannot_be_made_shorter_than_it_is(tmp_path: Path) -> None:

@@ -198,6 +198,29 @@ def other_model(path: Path) -> None:
     path.with_suffix(".weights.h5").rename(path)
 
 
+def make_external(file: h5py.File) -> None:
+    del file["dense_1/dense_1/bias:0"]
+    storage = [("/etc/hostname", 0, 32)]
+    file.create_dataset("dense_1/dense_1/bias:0", (8,), np.float32, external=storage)
+
+
+def make_virtual(file: h5py.File) -> None:
+    layout = h5py.VirtualLayout((8,), np.float32)
+    layout[:] = h5py.VirtualSource("elsewhere.h5", "data", (8,))
+    del file["dense_1/dense_1/bias:0"]
+    file.create_virtual_dataset("dense_1/dense_1/bias:0", layout)
+
+
+def make_unwritten(file: h5py.File) -> None:
+    del file["dense_1/dense_1/bias:0"]
+    file.create_dataset("dense_1/dense_1/bias:0", (2**30,), np.float32)
+
+
+def make_too_wide(file: h5py.File) -> None:
+    replace_array("dense_1/dense_1/kernel:0", np.zeros((16, 8193), np.float32))(file)
+    replace_array("dense_1/dense_1/bias:0", np.zeros(8193, np.float32))(file)
+
+
 KERNEL = np.zeros((16, 8), np.float32)
 BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "missing": (lambda path: None, "no such file"),
@@ -239,6 +262,10 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
         changed(replace_array("dense_1/dense_1/kernel:0", KERNEL, compression="gzip")),
         "not a plain array",
     ),
+    "kept in another file": (changed(make_external), "not a plain array"),
+    "virtual": (changed(make_virtual), "not a plain array"),
+    "declared but not stored": (changed(make_unwritten), "not a plain array"),
+    "too wide": (changed(make_too_wide), "expected 1 to 8192"),
     "activation": (
         changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "relu")),
         "activation 'relu'",
@@ -249,7 +276,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     ),
     "gravity": (
         changed(lambda f: f["keras_pendulum"].attrs.__setitem__("gravity", np.nan)),
-        "gravity of nan",
+        "the recorded gravity is nan",
     ),
 }
 
@@ -294,6 +321,17 @@ def test_a_save_that_fails_half_way_leaves_the_old_file_and_nothing_else(
         kp.save_weights(kp.DQN((4,)), path)
     assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
     assert_same_values(kp.load_weights(path), network())
+
+
+def test_an_old_file_is_swapped_and_never_written_into(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    (tmp_path / "old.h5").hardlink_to(tmp_path / "a.h5")
+    before = (tmp_path / "old.h5").read_bytes()
+    kp.save_weights(kp.DQN((4,)), tmp_path / "a.h5")
+    assert (tmp_path / "old.h5").read_bytes() == before
+    assert kp.load_weights(tmp_path / "a.h5").hidden_units == (4,)
 
 
 def test_the_recorded_file_of_keras_2_loads() -> None:

@@ -1,0 +1,19 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+CODE = "import os, keras_pendulum; print(os.environ['TF_NUM_INTRAOP_THREADS'])"
+
+
+def threads(**environment: str) -> str:
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
+    return subprocess.check_output(
+        [sys.executable, "-c", CODE], env=clean | environment, text=True
+    ).strip()
+
+
+def test_tensorflow_is_asked_for_one_thread_unless_the_user_has_chosen() -> None:
+    assert threads() == "1"
+    assert threads(TF_NUM_INTRAOP_THREADS="2") == "2"
