@@ -45,9 +45,15 @@ def test_the_learning_that_was_measured_is_as_good_as_promised() -> None:
 
 def test_the_shipped_policy_is_as_good_as_the_figures_say() -> None:
     score = kp.evaluate_policy(kp.load_weights(kp.find_weights("reference")))
-    for line in score.summary().replace("(standard deviation 39.84", "(…)\n").splitlines():
-        if not line.startswith(","):
-            assert f"    {line}\n" in README
+    for words, figure in {
+        "mean return": score.mean_return,
+        "Best possible on the same starts:": score.optimal_mean_return,
+        "Regret:": score.regret,
+    }.items():
+        found = re.search(rf"{words} (-?[\d.]+)", README)
+        assert found is not None
+        # On another processor a last digit may turn one action.
+        assert float(found.group(1)) == pytest.approx(figure, abs=0.015)
 
 
 @pytest.mark.parametrize("name", table_of_departures())
