@@ -6,11 +6,13 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.backend import require_tensorflow
-from keras_pendulum.command_line import OneLineParser, run_command
+from keras_pendulum.command_line import OneLineParser, name, run_command
 from keras_pendulum.display import draw_without_display, require_display
+from keras_pendulum.errors import UserError
 
 if TYPE_CHECKING:
     from keras_pendulum.network import DQN
@@ -32,20 +34,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead")
     parser.add_argument("--render", action="store_true", help="show the episodes in a window")
-    parser.add_argument("--gif", type=_gif, metavar="FILE.gif", help="film the first episode")
+    parser.add_argument("--gif", type=name, metavar="FILE", help="film the first episode")
     arguments = parser.parse_args(argv)
     return run_command(lambda: _evaluate(arguments))
 
 
-def _gif(text: str) -> str:
-    # A slip of the shell's completion would else put the film in place of the weights.
-    if not text.endswith(".gif"):
-        raise argparse.ArgumentTypeError(f"{text!r} does not end in .gif")
-    return text
-
-
 def _evaluate(arguments: argparse.Namespace) -> int:
     require_tensorflow()
+    if arguments.gif:
+        _require_no_other_file(Path(arguments.gif))
     if arguments.render:
         require_display()
 
@@ -68,6 +65,16 @@ def _evaluate(arguments: argparse.Namespace) -> int:
     else:
         print(score.summary())
     return 0
+
+
+def _require_no_other_file(path: Path) -> None:
+    # A slip of the shell's completion would else put the film in place of the weights.
+    try:
+        other = path.is_file() and not path.read_bytes().startswith(b"GIF8")
+    except OSError as error:
+        raise UserError(f"cannot write {path}: {error.strerror}") from error
+    if other:
+        raise UserError(f"{path} holds something else than a GIF: name another file")
 
 
 def _film(network: DQN, seed: int, gravity: float, path: str) -> None:
