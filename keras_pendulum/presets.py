@@ -40,7 +40,7 @@ class Config:
     episodes: int = _setting(500, "episodes of 200 steps (original: 500)", low=1, high=1_000_000)
     seed: int = _setting(0, "seed of every random draw of the run", low=0, high=2**32 - 1)
     hidden_units: tuple[int, ...] = _setting(
-        (512, 256, 128), "widths of the tanh layers, comma-separated", low=1, high=8192
+        (512, 256, 128), "widths of the tanh layers, comma-separated (original)", low=1, high=8192
     )
     torque_count: int = _setting(
         41, "torques, evenly spaced from -2 to 2 N·m (original: linspace)", low=2, high=1001
@@ -49,16 +49,21 @@ class Config:
         50_000, "transitions remembered (original: 8000)", low=1, high=10_000_000
     )
     batch_size: int = _setting(
-        32, "transitions in an update, drawn without replacement", low=1, high=65_536
+        32, "transitions in an update, drawn without replacement (original: 32)", low=1, high=65_536
     )
     discount: float = _setting(0.9, "discount γ a step (original: 0.9)", low=0, high=1)
     epsilon_start: float = _setting(
-        0.9, "ε before the first decay: share of random torques", low=0, high=1
+        0.9, "ε before the first decay: share of random torques (original: 0.9)", low=0, high=1
     )
-    epsilon_decay: float = _setting(0.99, "factor on ε before each episode", low=0, high=1)
-    epsilon_min: float = _setting(0.01, "ε never falls below this", low=0, high=1)
+    epsilon_decay: float = _setting(
+        0.99, "factor on ε before each episode (original: 0.99)", low=0, high=1
+    )
+    epsilon_min: float = _setting(0.01, "ε never falls below this (original: 0.01)", low=0, high=1)
     learning_starts: int = _setting(
-        40, "updates follow each episode with a higher number than this", low=0, high=1_000_000
+        40,
+        "updates follow each episode with a higher number than this (original: 40)",
+        low=0,
+        high=1_000_000,
     )
     updates_per_episode: int = _setting(
         30,
@@ -66,7 +71,9 @@ class Config:
         low=1,
         high=10_000,
     )
-    learning_rate: float = _setting(1e-3, "Adam's first step size", low=1e-9, high=10)
+    learning_rate: float = _setting(
+        1e-3, "Adam's first step size (original: 1e-3)", low=1e-9, high=10
+    )
     learning_rate_schedule: str = _setting(
         "cosine",
         "constant (original), or a cosine from the first step size to 0 at the last update",
@@ -79,10 +86,16 @@ class Config:
         choices=("soft", "hard", "none"),
     )
     target_blend: float = _setting(
-        0.01, "soft: share of the online weights blended in after each update", low=0, high=1
+        0.01,
+        "soft: share of the online weights blended in after each update (tried out; no original)",
+        low=0,
+        high=1,
     )
     target_period: int = _setting(
-        200, "hard: updates from one copy to the next", low=1, high=1_000_000
+        200,
+        "hard: updates from one copy to the next (a usual value; no original)",
+        low=1,
+        high=1_000_000,
     )
     remembered_action: str = _setting(
         "index",
@@ -91,7 +104,7 @@ class Config:
         choices=("index", "truncated"),
     )
     save_every: int = _setting(
-        10, "episodes from one checkpoint to the next", low=1, high=1_000_000
+        10, "episodes from one checkpoint to the next (walkthrough: 10)", low=1, high=1_000_000
     )
 
     def __post_init__(self) -> None:

@@ -6,6 +6,7 @@ import json
 import os
 import pty
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -16,6 +17,7 @@ from PIL import Image, ImageSequence
 
 import keras_pendulum as kp
 from keras_pendulum import evaluate, train
+from keras_pendulum.episodes import EpisodeRecord
 
 RECORDED = DATA / "pendulum_weight.keras2.h5"
 
@@ -224,3 +226,22 @@ def test_the_librarys_names_are_all_there() -> None:
     assert all(getattr(kp, name) is not None for name in kp.__all__)
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         kp.nonsense  # noqa: B018
+
+
+def test_the_first_control_c_asks_to_stop_and_the_second_ends_the_command() -> None:
+    with train._Interrupt(kp.preset("original")) as interrupt:
+        signal.raise_signal(signal.SIGINT)
+        assert interrupt.asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_control_c_after_the_last_episode_ends_the_command_at_once() -> None:
+    rows = (EpisodeRecord(i, -1.0, -200.0, 0.5, 0.0, 200, 0, 0.1) for i in (0, 1))
+    with train._Interrupt(kp.preset("original", episodes=2)) as interrupt:
+        interrupt.listen(next(rows))
+        assert signal.getsignal(signal.SIGINT) == interrupt._ask
+        interrupt.listen(next(rows))
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert not interrupt.asked

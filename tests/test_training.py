@@ -199,20 +199,23 @@ def test_the_picture_shows_the_best_possible_above_chance(
     assert chance == pytest.approx(-909, rel=0.1)
 
 
-def test_a_run_killed_before_its_first_episode_ends_can_be_resumed(tmp_path: Path) -> None:
-    config = kp.preset("original", episodes=3, hidden_units=(8,))
-
+def test_a_run_killed_in_its_first_episode_leaves_one_run_and_can_be_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class KilledError(Exception):
         pass
 
-    def kill(record: object) -> None:
+    def kill(*parts: object) -> float:
         raise KilledError
 
     kp.train_dqn(kp.preset("original", seed=9, episodes=2, hidden_units=(8,)), tmp_path)
-    with pytest.raises(KilledError):
-        kp.train_dqn(config, tmp_path, overwrite=True, listeners=[kill])
+    config = kp.preset("original", episodes=3, hidden_units=(8,))
+    with monkeypatch.context() as patched:
+        patched.setattr("keras_pendulum.episodes._run_episode", kill)
+        with pytest.raises(KilledError):
+            kp.train_dqn(config, tmp_path, overwrite=True)
     assert not (tmp_path / "rewards.png").exists()  # it was the other run's
-    assert load_config(tmp_path / "pendulum_weight.h5").seed == 0
+    assert load_config(tmp_path / "pendulum_weight.h5") == config
     assert_same(kp.train_dqn(config, tmp_path, resume=True), kp.train_dqn(config))
 
 
