@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.backend import prepare_environment, require_tensorflow
+from keras_pendulum.backend import prepare_environment, quick_import, require_tensorflow
 
 __version__ = "0.1.0"
 
@@ -57,5 +57,6 @@ def __getattr__(name: str) -> Any:
     for home, names in _HOMES.items():
         if name in names:
             require_tensorflow()
-            return getattr(importlib.import_module(f"keras_pendulum.{home}"), name)
+            with quick_import():
+                return getattr(importlib.import_module(f"keras_pendulum.{home}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.network import DQN
 from keras_pendulum.policy import GreedyPolicy
-from keras_pendulum.q_learning import mean_squared_error, td_target
+from keras_pendulum.q_learning import double_td_target, mean_squared_error, td_target
 from keras_pendulum.randomness import RandomSource
 from keras_pendulum.replay import Transitions
 from keras_pendulum.target_network import TargetUpdate
@@ -26,6 +26,7 @@ class Agent:
         update_target: how `target` follows `online` after each update.
         optimizer: a Keras optimizer for the online network.
         discount: γ.
+        double_q: whether `online` chooses the next action that `target` values.
         random: source of the exploration draws.
     """
 
@@ -36,6 +37,7 @@ class Agent:
         update_target: TargetUpdate,
         optimizer: keras.optimizers.Optimizer,
         discount: float,
+        double_q: bool,
         random: RandomSource,
     ) -> None:
         self.online = online
@@ -43,6 +45,7 @@ class Agent:
         self.update_target = update_target
         self.optimizer = optimizer
         self.discount = discount
+        self.double_q = double_q
         self.random = random
         optimizer.build(online.trainable_variables)
         self._compiled_updates = tf.function(self._updates, jit_compile=True)
@@ -73,7 +76,12 @@ class Agent:
     def learn(self, batch: Transitions) -> tf.Tensor:
         """One update from a batch [B, ...]; returns its loss, a scalar."""
         next_q = self.target(batch.next_observation)  # [B, A]
-        target = td_target(batch.reward, batch.terminated, next_q, self.discount)  # [B]
+        outcome = (batch.reward, batch.terminated, next_q)
+        if self.double_q:
+            next_q_online = self.online(batch.next_observation)  # [B, A]
+            target = double_td_target(*outcome, next_q_online, self.discount)  # [B]
+        else:
+            target = td_target(*outcome, self.discount)  # [B]
         with tf.GradientTape() as tape:
             q = self.online(batch.observation)  # [B, A]
             loss = mean_squared_error(q, batch.action, target)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from keras_pendulum.errors import UserError
 
@@ -33,3 +37,21 @@ def require_tensorflow() -> None:
         raise UserError(
             f"KERAS_BACKEND is {backend!r}, but this package runs on TensorFlow: unset it"
         )
+
+
+@contextmanager
+def quick_import() -> Iterator[None]:
+    """Keeps the garbage collector away from what is imported meanwhile.
+
+    TensorFlow makes so many objects that live until the end that looking through them, again and
+    again and once more at exit, takes longer than half of the import itself.
+    """
+    imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+        if not imported and "tensorflow" in sys.modules:
+            gc.freeze()

@@ -58,7 +58,7 @@ def learn_episodes(
         epsilon = schedule(episode)
         before = replay.added
         seed = random.seed if episode == 0 else None
-        total = _run_episode(env, torques, agent, replay, epsilon, seed)
+        total = _run_episode(env, torques, agent, replay, epsilon, config.reward_scale, seed)
         loss = float("nan")
         if episode > config.learning_starts:
             positions = [
@@ -85,6 +85,7 @@ def _run_episode(
     agent: Agent,
     replay: ReplayBuffer,
     epsilon: float,
+    reward_scale: float,
     seed: int | None,
 ) -> float:
     """Acts and remembers until the episode ends; returns the episode return."""
@@ -95,8 +96,8 @@ def _run_episode(
         action = agent.select_action(observation, epsilon)
         following, reward, terminated, truncated, _ = env.step(torques.torque(action))
         remembered = torques.remembered_index(action)
-        replay.add(observation, remembered, float(reward), following, terminated)
         total += float(reward)
+        replay.add(observation, remembered, reward_scale * float(reward), following, terminated)
         observation = following
         over = terminated or truncated
     return total

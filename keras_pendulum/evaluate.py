@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.backend import require_tensorflow
+from keras_pendulum.backend import quick_import, require_tensorflow
 from keras_pendulum.command_line import OneLineParser, name, run_command
 from keras_pendulum.display import draw_without_display, require_display
 from keras_pendulum.errors import UserError
@@ -46,8 +46,9 @@ def _evaluate(arguments: argparse.Namespace) -> int:
     if arguments.render:
         require_display()
 
-    from keras_pendulum.evaluation import evaluate_policy
-    from keras_pendulum.weights import find_weights, load_weights
+    with quick_import():
+        from keras_pendulum.evaluation import evaluate_policy
+        from keras_pendulum.weights import find_weights, load_weights
 
     path = find_weights(arguments.weights)
     network = load_weights(path)

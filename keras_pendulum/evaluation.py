@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import gymnasium
@@ -124,6 +125,7 @@ def evaluate_policy(
     )
 
 
+@cache
 def random_return(environment: str, gravity: float, episodes: int = 100) -> float:
     """Mean return of uniformly random torques from the starts of seeds 0, 1, …: the floor."""
     env = make_environment(environment, gravity)

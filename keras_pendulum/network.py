@@ -17,6 +17,7 @@ class Origin:
     gravity: float | None = None  # m/s²
     preset: str | None = None
     seed: int | None = None
+    config: str | None = None  # the settings of its run, as JSON
 
 
 class DQN(keras.Model):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,15 @@ from keras_pendulum.environment import STEPS_PER_EPISODE
 from keras_pendulum.episodes import EpisodeRecord
 
 _MEAN_OVER = 10  # episodes
+_LEVEL_LINES = (("black", "--"), ("#D55E00", ":"))
 
 
-def learning_curve(
-    history: Sequence[EpisodeRecord], best_return: float, random_return: float
-) -> bytes:
-    """The original's plot, episode against average reward a step, between chance and the best.
+def learning_curve(history: Sequence[EpisodeRecord], returns: Mapping[str, float]) -> bytes:
+    """The original's plot: episode against average reward a step.
 
     Args:
         history: at least one record.
-        best_return: best possible mean return of an episode.
-        random_return: mean return of uniformly random torques.
+        returns: mean returns of 200 steps to compare with, by name; each becomes a level line.
 
     Returns:
         A PNG file's bytes.
@@ -39,12 +37,8 @@ def learning_curve(
         mean = np.convolve(rewards, np.ones(_MEAN_OVER) / _MEAN_OVER, "valid")
         label = f"mean of {_MEAN_OVER} episodes"
         axes.plot(episodes[_MEAN_OVER - 1 :], mean, color="#0072B2", linewidth=2, label=label)
-    axes.axhline(
-        best_return / STEPS_PER_EPISODE, color="black", linestyle="--", label="best possible"
-    )
-    axes.axhline(
-        random_return / STEPS_PER_EPISODE, color="#D55E00", linestyle=":", label="random torque"
-    )
+    for (name, level), (color, style) in zip(returns.items(), _LEVEL_LINES, strict=False):
+        axes.axhline(level / STEPS_PER_EPISODE, color=color, linestyle=style, label=name)
     axes.set_xlabel("Episode")
     axes.set_ylabel("Average reward per step")
     axes.legend(loc="lower right")

@@ -37,7 +37,13 @@ class Config:
     gravity: float = _setting(
         1.0, "gravity in m/s² (Gymnasium's own default is 10; the original uses 1)", low=0, high=100
     )
-    episodes: int = _setting(500, "episodes of 200 steps (original: 500)", low=1, high=1_000_000)
+    episodes: int = _setting(500, "episodes (original: 500)", low=1, high=1_000_000)
+    episode_steps: int = _setting(
+        STEPS_PER_EPISODE,
+        "steps of a training episode (original: 200); evaluation always makes 200",
+        low=1,
+        high=10_000,
+    )
     seed: int = _setting(0, "seed of every random draw of the run", low=0, high=2**32 - 1)
     hidden_units: tuple[int, ...] = _setting(
         (512, 256, 128), "widths of the tanh layers, comma-separated (original)", low=1, high=8192
@@ -46,12 +52,21 @@ class Config:
         41, "torques, evenly spaced from -2 to 2 N·m (original: linspace)", low=2, high=1001
     )
     replay_capacity: int = _setting(
-        50_000, "transitions remembered (original: 8000)", low=1, high=10_000_000
+        25_000, "transitions remembered (original: 8000)", low=1, high=10_000_000
     )
     batch_size: int = _setting(
         32, "transitions in an update, drawn without replacement (original: 32)", low=1, high=65_536
     )
     discount: float = _setting(0.9, "discount γ a step (original: 0.9)", low=0, high=1)
+    reward_scale: float = _setting(
+        1.0, "factor on the rewards that are learned from (original: 1)", low=1e-6, high=1e6
+    )
+    bootstrap: str = _setting(
+        "max",
+        "how what follows is valued: max, the target network's highest value (original), or "
+        "double, its value of the online network's choice (van Hasselt et al. 2016)",
+        choices=("max", "double"),
+    )
     epsilon_start: float = _setting(
         0.9, "ε before the first decay: share of random torques (original: 0.9)", low=0, high=1
     )
@@ -66,7 +81,7 @@ class Config:
         high=1_000_000,
     )
     updates_per_episode: int = _setting(
-        30,
+        22,
         "gradient updates after an episode (original: 1, `update-starvation`)",
         low=1,
         high=10_000,
@@ -86,7 +101,7 @@ class Config:
         choices=("soft", "hard", "none"),
     )
     target_blend: float = _setting(
-        0.01,
+        0.1,
         "soft: share of the online weights blended in after each update (tried out; no original)",
         low=0,
         high=1,
@@ -111,7 +126,7 @@ class Config:
         for spec in fields(self):
             value = checked_setting(spec.name, getattr(self, spec.name))
             object.__setattr__(self, spec.name, value)
-        stored = min(self.replay_capacity, (self.learning_starts + 2) * STEPS_PER_EPISODE)
+        stored = min(self.replay_capacity, (self.learning_starts + 2) * self.episode_steps)
         if self.batch_size > stored:
             raise ConfigError(
                 f"batch_size {self.batch_size} is larger than the {stored} transitions that "
@@ -183,8 +198,24 @@ _WALKTHROUGH = replace(
     remembered_action="truncated",
 )
 
+# The standard, harder task: g = 10, where the torque cannot lift the pendulum in one go.
+_SWINGUP = replace(
+    _REFERENCE,
+    preset="swingup",
+    gravity=10.0,
+    episodes=1700,
+    episode_steps=60,
+    replay_capacity=100_000,
+    batch_size=64,
+    discount=0.98,
+    reward_scale=0.02,
+    bootstrap="double",
+    epsilon_decay=0.997,
+    updates_per_episode=30,
+)
+
 PRESETS: dict[str, Config] = {
-    config.preset: config for config in (_REFERENCE, _ORIGINAL, _WALKTHROUGH)
+    config.preset: config for config in (_REFERENCE, _ORIGINAL, _WALKTHROUGH, _SWINGUP)
 }
 
 

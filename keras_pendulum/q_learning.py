@@ -28,6 +28,33 @@ def td_target(
     return tf.stop_gradient(reward + bootstrap)
 
 
+def double_td_target(
+    reward: tf.Tensor,
+    terminated: tf.Tensor,
+    next_q: tf.Tensor,
+    next_q_online: tf.Tensor,
+    discount: float,
+) -> tf.Tensor:
+    """The same with the next action chosen by the online network, valued by the target network.
+
+    A maximum over values that err picks what is overrated; a second network seldom overrates the
+    same action. Van Hasselt et al. 2016, section "Double DQN".
+
+    Args:
+        reward: [B] float32.
+        terminated: [B] bool.
+        next_q: [B, A] float32, the target network's values of the next observations.
+        next_q_online: [B, A] float32, the online network's.
+        discount: γ.
+
+    Returns:
+        [B] float32. No gradient flows through it.
+    """
+    best = tf.argmax(next_q_online, axis=1)  # [B]
+    value = tf.gather(next_q, best, batch_dims=1)  # [B]
+    return tf.stop_gradient(reward + tf.where(terminated, 0.0, discount * value))
+
+
 def mean_squared_error(q: tf.Tensor, action: tf.Tensor, target: tf.Tensor) -> tf.Tensor:
     """The original's loss: the squared error averaged over all B·A outputs.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from dataclasses import asdict
 
 import keras
 
@@ -32,7 +34,7 @@ class Run:
     def __init__(self, config: Config, initial: DQN | None = None) -> None:
         self.config = config
         self.random = RandomSource(config.seed)
-        self.env = make_environment(config.environment, config.gravity)
+        self.env = make_environment(config.environment, config.gravity, steps=config.episode_steps)
         self.torques = make_torques(config)
         self.replay = ReplayBuffer(config.replay_capacity)
         self.agent = make_agent(config, self.random, initial)
@@ -61,7 +63,13 @@ def make_agent(config: Config, random: RandomSource, initial: DQN | None = None)
         config.hidden_units,
         config.torque_count,
         seed=config.seed,
-        origin=Origin(config.environment, config.gravity, config.preset, config.seed),
+        origin=Origin(
+            config.environment,
+            config.gravity,
+            config.preset,
+            config.seed,
+            json.dumps(asdict(config)),
+        ),
     )
     if initial is not None:
         _copy_weights(initial, online)
@@ -72,7 +80,8 @@ def make_agent(config: Config, random: RandomSource, initial: DQN | None = None)
             config.learning_rate, max(1, config.total_updates)
         )
     optimizer = keras.optimizers.Adam(learning_rate)  # Kingma & Ba 2015; ε = 1e-7, Keras's own
-    return Agent(online, target, update_target, optimizer, config.discount, random)
+    double_q = config.bootstrap == "double"
+    return Agent(online, target, update_target, optimizer, config.discount, double_q, random)
 
 
 def _copy_weights(source: DQN, destination: DQN) -> None:

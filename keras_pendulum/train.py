@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from keras_pendulum.backend import require_tensorflow
+from keras_pendulum.backend import quick_import, require_tensorflow
 from keras_pendulum.command_line import (
     OneLineParser,
     add_config_flags,
@@ -60,10 +60,11 @@ def _train(arguments: argparse.Namespace) -> int:
         raise UserError("--init starts a new run, --resume goes on with one: give one of them")
     require_tensorflow()
 
-    from keras_pendulum.checkpoint import load_config
-    from keras_pendulum.run_folder import RunFolder
-    from keras_pendulum.training import train_dqn
-    from keras_pendulum.weights import find_weights, load_weights
+    with quick_import():
+        from keras_pendulum.checkpoint import load_config
+        from keras_pendulum.run_folder import RunFolder
+        from keras_pendulum.training import train_dqn
+        from keras_pendulum.weights import find_weights, load_weights
 
     if arguments.resume:
         if arguments.preset:

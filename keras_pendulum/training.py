@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from keras_pendulum import pictures
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.checkpoint import load_checkpoint, save_checkpoint
+from keras_pendulum.environment import STEPS_PER_EPISODE
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import UserError
 from keras_pendulum.evaluation import random_return
@@ -92,7 +93,11 @@ def train_dqn(
     if folder is not None:
         save_checkpoint(run, folder.weights)
         if finished:
-            best = float(optimal_return(config.gravity, range(1000)).mean())
-            chance = random_return(config.environment, config.gravity)
-            write_atomically(folder.picture, pictures.learning_curve(run.history, best, chance))
+            levels = {}
+            if config.episode_steps == STEPS_PER_EPISODE:  # else they are not of the same steps
+                levels = {
+                    "best possible": float(optimal_return(config.gravity, range(1000)).mean()),
+                    "random torque": random_return(config.environment, config.gravity),
+                }
+            write_atomically(folder.picture, pictures.learning_curve(run.history, levels))
     return TrainingResult(run.agent.online, run.history, finished)

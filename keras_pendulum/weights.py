@@ -7,7 +7,9 @@ loader ever touches the file.
 from __future__ import annotations
 
 import io
+import json
 import os
+import platform
 from pathlib import Path
 from typing import Any
 
@@ -21,30 +23,42 @@ from keras_pendulum.network import DQN, Origin
 from keras_pendulum.presets import checked_setting
 
 _ORIGIN = "keras_pendulum"  # our group beside the layers; Keras ignores it
+_OPTIONAL = ("gravity", "preset", "seed", "config")  # of Origin: left out where not known
 
 
-def save_weights(network: DQN, path: str | os.PathLike[str]) -> None:
+def save_weights(
+    network: DQN, path: str | os.PathLike[str], evaluated_return: float | None = None
+) -> None:
     """Writes the network to `path`, replacing an old file only when the new one is whole.
 
     Keras 2 and Keras 3 open the file with `model.load_weights`.
 
+    Args:
+        network: the network; what its `origin` knows becomes attributes of the group
+            `keras_pendulum`, beside the versions of what wrote the file.
+        path: the file.
+        evaluated_return: the mean return that `evaluate_policy(network)` gave, one more attribute.
+
     Raises:
         UserError: the file cannot be written.
     """
-    write_atomically(path, weights_file(network))
+    write_atomically(path, weights_file(network, evaluated_return=evaluated_return))
 
 
-def weights_file(network: DQN, **groups: dict[str, NDArray[Any]]) -> bytes:
+def weights_file(
+    network: DQN, *, evaluated_return: float | None = None, **groups: dict[str, NDArray[Any]]
+) -> bytes:
     """The bytes of the network's `.h5`, with further groups of arrays beside the layers."""
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         layer_files.write_layers(file, network.get_weights())
         about = file.create_group(_ORIGIN).attrs
         about["version"] = __version__
+        about["versions"] = json.dumps(_versions())
         about["activation"] = network.activation
         about["environment"] = network.origin.environment
-        for name in ("gravity", "preset", "seed"):
-            value = getattr(network.origin, name)
+        known = {name: getattr(network.origin, name) for name in _OPTIONAL}
+        for name, value in {**known, "evaluated_return": evaluated_return}.items():
             if value is not None:
                 about[name] = value
         for name, arrays in groups.items():
@@ -98,7 +112,21 @@ def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Or
         gravity=gravity,
         preset=str(about["preset"]) if "preset" in about else None,
         seed=int(about["seed"]) if "seed" in about else None,
+        config=str(about["config"]) if "config" in about else None,
     )
+
+
+def _versions() -> dict[str, str]:
+    """Of what made the numbers in the file."""
+    import gymnasium
+    import keras
+    import numpy as np
+    import tensorflow as tf
+
+    return {
+        "python": platform.python_version(),
+        **{module.__name__: module.__version__ for module in (tf, keras, gymnasium, np)},
+    }
 
 
 def find_weights(name: str) -> Path:

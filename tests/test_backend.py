@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
+
+from keras_pendulum.backend import quick_import
 
 CODE = "import os, keras_pendulum; print(os.environ['TF_NUM_INTRAOP_THREADS'])"
 
@@ -17,3 +20,9 @@ def threads(**environment: str) -> str:
 def test_tensorflow_is_asked_for_one_thread_unless_the_user_has_chosen() -> None:
     assert threads() == "1"
     assert threads(TF_NUM_INTRAOP_THREADS="2") == "2"
+
+
+def test_a_quick_import_leaves_the_garbage_collector_on() -> None:
+    with quick_import():
+        assert not gc.isenabled()
+    assert gc.isenabled()

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import tensorflow as tf
 
-from keras_pendulum.q_learning import mean_squared_error, td_target
+from keras_pendulum.q_learning import double_td_target, mean_squared_error, td_target
 
 NEXT_Q = tf.constant([[1.0, 5.0, 2.0], [7.0, 0.0, 1.0], [-3.0, -1.0, -2.0]])  # [3, 3]
 
@@ -24,6 +24,29 @@ def test_no_gradient_flows_through_the_target() -> None:
     with tf.GradientTape() as tape:
         tape.watch(NEXT_Q)
         target = td_target(tf.zeros(3), tf.zeros(3, bool), NEXT_Q, 0.9)
+    assert tape.gradient(target, NEXT_Q) is None
+
+
+def test_double_target_by_hand_values_what_the_online_network_chooses() -> None:
+    reward = tf.constant([10.0, 20.0, 30.0])
+    terminated = tf.constant([False, True, False])
+    next_q_online = tf.constant([[9.0, 8.0, 7.0], [0.0, 1.0, 2.0], [1.0, 2.0, 3.0]])
+    target = double_td_target(reward, terminated, NEXT_Q, next_q_online, 0.5)
+    np.testing.assert_allclose(target, [10 + 0.5 * 1, 20, 30 + 0.5 * -2])
+
+
+def test_double_target_is_the_plain_one_where_both_networks_are_the_same() -> None:
+    reward, terminated = tf.zeros(3), tf.zeros(3, bool)
+    np.testing.assert_array_equal(
+        double_td_target(reward, terminated, NEXT_Q, NEXT_Q, 0.9),
+        td_target(reward, terminated, NEXT_Q, 0.9),
+    )
+
+
+def test_no_gradient_flows_through_the_double_target() -> None:
+    with tf.GradientTape() as tape:
+        tape.watch(NEXT_Q)
+        target = double_td_target(tf.zeros(3), tf.zeros(3, bool), NEXT_Q, NEXT_Q, 0.9)
     assert tape.gradient(target, NEXT_Q) is None
 
 

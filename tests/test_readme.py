@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import pytest
 
 import keras_pendulum as kp
@@ -101,3 +102,16 @@ def test_pictures_and_named_modules_exist() -> None:
     assert named <= modules
     unnamed = {"__init__.py", "errors.py", "backend.py", "atomic_file.py", "display.py"}
     assert modules - named == unnamed
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "weights").glob("*.h5")))
+def test_a_shipped_policy_repeats_the_return_that_its_file_states(name: str) -> None:
+    path = kp.find_weights(name)
+    with h5py.File(path) as file:
+        stated = dict(file["keras_pendulum"].attrs)
+    network = kp.load_weights(path)
+    assert stated["preset"] == json.loads(stated["config"])["preset"] == name
+    assert stated["seed"] == json.loads(stated["config"])["seed"]
+    assert json.loads(stated["versions"]).keys() >= {"tensorflow", "keras", "gymnasium", "numpy"}
+    score = kp.evaluate_policy(network)
+    assert score.mean_return == pytest.approx(stated["evaluated_return"], abs=0.01)

@@ -42,7 +42,10 @@ def twin_agent(config: Config, weights: Weights) -> torch_agent.Agent:
         "soft": torch_agent.soft_update(config.target_blend),
         "hard": torch_agent.hard_update(config.target_period),
     }[config.target_update]
-    return torch_agent.Agent(weights, config.discount, learning_rate, update_target)
+    double_q = config.bootstrap == "double"
+    return torch_agent.Agent(
+        weights, config.discount, learning_rate, update_target, double_q=double_q
+    )
 
 
 def gap(ours: Iterable[NDArray[Any]], theirs: Iterable[NDArray[Any]]) -> float:
@@ -62,8 +65,9 @@ def recorded_weights(recorded: Recorded, when: str) -> Weights:
         # Period 7, so that the 10 updates between comparisons end at every phase of it; 48
         # episodes make 210 updates, so that the cosine nearly reaches 0 within the 200.
         (preset(target_update="hard", target_period=7, episodes=48, seed=1), 0.1),
+        (preset(bootstrap="double", target_blend=0.01, seed=1), 0.1),
     ],
-    ids=["original", "reference", "hard target"],
+    ids=["original", "reference", "hard target", "double"],
 )
 def test_200_updates_give_the_same_losses_and_weights(
     config: Config, terminated_share: float, recorded_memory: ReplayBuffer

@@ -86,7 +86,7 @@ def test_a_run_leaves_its_four_files(tmp_path: Path) -> None:
     assert [float(row["return"]) for row in rows] == [r.episode_return for r in result.history]
     assert rows[40]["loss"] == ""
     assert float(rows[41]["loss"]) > 0
-    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "150")
+    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "110")
 
     picture = matplotlib.image.imread(folder / "rewards.png")
     assert picture.shape[0] > 300
@@ -186,8 +186,8 @@ def test_the_picture_shows_the_best_possible_above_chance(
 ) -> None:
     drawn: list[tuple[float, float]] = []
 
-    def draw(history: object, best_return: float, random_return: float) -> bytes:
-        drawn.append((best_return, random_return))
+    def draw(history: object, returns: dict[str, float]) -> bytes:
+        drawn.append((returns["best possible"], returns["random torque"]))
         return b"a picture"
 
     monkeypatch.setattr("keras_pendulum.pictures.learning_curve", draw)
@@ -317,3 +317,18 @@ def test_control_c_saves_a_checkpoint_and_exits_130(tmp_path: Path) -> None:
     saved = load_checkpoint(tmp_path / "run" / "pendulum_weight.h5", config)
     printed = [line for line in lines if line.startswith("Episode: ")]
     assert [record.line() + "\n" for record in saved.history] == printed
+
+
+def test_a_training_episode_has_the_steps_that_are_asked_for() -> None:
+    result = kp.train_dqn(kp.preset(episodes=3, episode_steps=7, batch_size=8))
+    assert [record.environment_steps for record in result.history] == [7, 14, 21]
+
+
+def test_rewards_are_learned_from_at_their_scale_and_reported_as_they_are() -> None:
+    plain, scaled = (Run(kp.preset(episodes=1, reward_scale=scale)) for scale in (1.0, 0.5))
+    for run in (plain, scaled):
+        list(run.episodes())
+    np.testing.assert_allclose(
+        scaled.replay.at(range(200)).reward, 0.5 * plain.replay.at(range(200)).reward
+    )
+    assert scaled.history[0].episode_return == plain.history[0].episode_return

@@ -67,6 +67,15 @@ def td_target(reward: Tensor, terminated: Tensor, next_q: Tensor, discount: floa
     return (reward + bootstrap).detach()
 
 
+def double_td_target(
+    reward: Tensor, terminated: Tensor, next_q: Tensor, next_q_online: Tensor, discount: float
+) -> Tensor:
+    """The same, with the next action chosen by the online network's values [B, A]."""
+    best = next_q_online.argmax(dim=1, keepdim=True)  # [B, 1]
+    bootstrap = torch.where(terminated, 0.0, discount * next_q.gather(1, best)[:, 0])  # [B]
+    return (reward + bootstrap).detach()
+
+
 def mean_squared_error(q: Tensor, action: Tensor, target: Tensor) -> Tensor:
     """The squared error averaged over all B·A outputs; an output not taken is its own target.
 
@@ -129,6 +138,7 @@ class Agent:
         learning_rate: Adam's step size, from the number of updates made before.
         update_target: None makes the online network its own target.
         epsilon: Adam's ε in torch's place, from the number of the step.
+        double_q: whether the online network chooses the next action.
     """
 
     def __init__(
@@ -138,6 +148,7 @@ class Agent:
         learning_rate: Callable[[int], float],
         update_target: TargetUpdate | None = None,
         epsilon: Callable[[int], float] = keras_epsilon,
+        double_q: bool = False,
     ) -> None:
         self.online = from_keras(weights)
         self.target = self.online if update_target is None else from_keras(weights)
@@ -145,6 +156,7 @@ class Agent:
         self.learning_rate = learning_rate
         self.update_target = update_target
         self.epsilon = epsilon
+        self.double_q = double_q
         self.optimizer = torch.optim.Adam(self.online.parameters(), betas=BETAS)
         self.updates = 0
 
@@ -154,8 +166,12 @@ class Agent:
         settings["lr"] = self.learning_rate(self.updates)
         settings["eps"] = self.epsilon(self.updates + 1)
         with torch.no_grad():
-            next_q = self.target(batch.next_observation)  # [B, A]
-        target = td_target(batch.reward, batch.terminated, next_q, self.discount)  # [B]
+            outcome = (batch.reward, batch.terminated, self.target(batch.next_observation))
+            if self.double_q:
+                next_q_online = self.online(batch.next_observation)  # [B, A]
+                target = double_td_target(*outcome, next_q_online, self.discount)  # [B]
+            else:
+                target = td_target(*outcome, self.discount)  # [B]
         loss = mean_squared_error(self.online(batch.observation), batch.action, target)
         self.optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
