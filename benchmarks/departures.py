@@ -1,30 +1,40 @@
-"""What each departure of `reference` from the original is worth: learning without it.
+"""What each setting in which a preset departs from the one before it is worth.
 
-    python -m benchmarks.departures
+    python -m benchmarks.departures [reference|swingup [SEEDS]]
 
-Trains `original`, `reference`, and `reference` with one departure taken back at a time, with five
-seeds each, and writes the greedy regrets (reset seeds 0 to 99) to benchmarks/departures.json, from
-which README's table of departures takes its figures. Five minutes on two cores.
+Trains `reference`, which departs from `original`, or `swingup`, which departs from `reference`:
+as it is, and with one departure taken back at a time, with the training seeds 0, 1, … (5 seeds),
+two at a time. Greedy regrets on the starts of seeds 0 to 99 go to benchmarks/results, from which
+README's tables of departures take their figures. `reference` takes five minutes on two cores,
+`swingup` three for each seed and departure.
 """
 
 from __future__ import annotations
 
 import json
 import multiprocessing
+import sys
 from dataclasses import fields, replace
-from pathlib import Path
 
 import keras_pendulum as kp
+from benchmarks.report import RESULTS, write
 
-RESULTS = Path(__file__).with_suffix(".json")
-SEEDS = range(5)
+BEFORE = {"reference": "original", "swingup": "reference"}
+# The task itself is no departure, and the name none either.
+_NOT_COUNTED = ("preset", "gravity")
 
 
-def departures() -> list[str]:
-    """The settings in which `reference` differs from `original`."""
-    ours, theirs = kp.preset("reference"), kp.preset("original")
-    names = [spec.name for spec in fields(kp.Config) if spec.name != "preset"]
+def departures(preset: str) -> list[str]:
+    """The settings in which a preset differs from the one before it."""
+    ours, theirs = kp.preset(preset), kp.preset(BEFORE[preset])
+    names = [spec.name for spec in fields(kp.Config) if spec.name not in _NOT_COUNTED]
     return [name for name in names if getattr(ours, name) != getattr(theirs, name)]
+
+
+def measured(preset: str) -> dict[str, list[float]]:
+    """The regrets of the last measurement, by what was taken back; the presets by their names."""
+    rows = json.loads((RESULTS / f"departures_{preset}.json").read_text())["rows"]
+    return {row["training"]: row["regrets"] for row in rows}
 
 
 def regret(config: kp.Config) -> float:
@@ -32,20 +42,29 @@ def regret(config: kp.Config) -> float:
     return round(kp.evaluate_policy(kp.train_dqn(config).network).regret, 1)
 
 
-def main() -> None:
+def main(preset: str = "reference", seeds: str = "5") -> None:
     """Trains every variant and writes the results."""
-    original, reference = kp.preset("original"), kp.preset("reference")
-    variants = {"original": original, "reference": reference}
-    for name in departures():
-        variants[name] = replace(reference, **{name: getattr(original, name)})
-    results = {}
+    ours, theirs = kp.preset(preset), kp.preset(BEFORE[preset])
+    variants = {BEFORE[preset]: replace(theirs, gravity=ours.gravity), preset: ours}
+    for name in departures(preset):
+        variants[name] = replace(ours, **{name: getattr(theirs, name)})
+    rows = []
     # Fresh processes, because TensorFlow does not survive a fork.
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         for name, config in variants.items():
-            results[name] = pool.map(regret, [replace(config, seed=seed) for seed in SEEDS], 1)
-            print(f"{name:25} {results[name]}", flush=True)
-    RESULTS.write_text(json.dumps(results, indent=2) + "\n")
+            configs = [replace(config, seed=seed) for seed in range(int(seeds))]
+            regrets = pool.map(regret, configs, 1)
+            rows.append(
+                {
+                    "training": name,
+                    "mean regret": round(sum(regrets) / len(regrets), 1),
+                    "worst regret": max(regrets),
+                    "regrets": regrets,
+                }
+            )
+            print(f"{name:25} {regrets}", flush=True)
+    write(f"departures_{preset}", f"python -m benchmarks.departures {preset} {seeds}", rows)
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

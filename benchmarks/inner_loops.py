@@ -18,7 +18,7 @@ import numpy as np
 import tensorflow as tf
 
 import keras_pendulum as kp
-from benchmarks.report import median, write
+from benchmarks.report import median, versions, write
 from keras_pendulum.environment import make_environment
 from keras_pendulum.replay import Transitions
 from keras_pendulum.run import Run
@@ -135,7 +135,7 @@ def main() -> None:
             "ratio": round(ours / bare, 2),
         }
     )
-    write("inner_loops", "python -m benchmarks.inner_loops", rows, peers=True)
+    write("inner_loops", "python -m benchmarks.inner_loops", rows, also=versions(["torch"]))
 
 
 if __name__ == "__main__":

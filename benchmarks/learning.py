@@ -1,16 +1,16 @@
 """How long the task of `reference` takes here and in other libraries, and how well it ends.
 
-    python -m benchmarks.learning [RUNS]
+    python -m benchmarks.learning [RUNS [PYTHON]]
 
 Whole processes in turns, one for each of the training seeds 0, 1, … (3 runs), all with the numbers
 of the preset `reference`; medians. This package's is the command `keras_pendulum.train` with all it
-does: checkpoints, picture, evaluation. The others only train and keep their weights. A library that
-is not installed (extra `bench`) is left out.
+does: checkpoints, picture, evaluation. The others only train and keep their weights. They run under
+PYTHON, that of an environment with the extra `bench`; by default the same as this package. Keras
+imports JAX where it finds it, so one of their own is fairer. What is not installed is left out.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.report import Process, median, run_process, write
 
-PEERS = {"Stable-Baselines3": ("sb3", "stable_baselines3"), "sbx": ("sbx", "sbx")}
+PEERS = {"stable-baselines3": "sb3", "sbx-rl": "sbx"}  # package: name in benchmarks.peers
 
 
 def regret(weights: Path) -> float:
@@ -38,27 +38,29 @@ def regret(weights: Path) -> float:
     return kp.evaluate_policy(network, gravity=config.gravity).regret
 
 
-def main(runs: int = 3) -> None:
+def main(runs: str = "3", python: str = sys.executable) -> None:
     """Trains all in turns and writes the table."""
     done: dict[str, list[tuple[Process, Path]]] = {}
+    installed = run_process("-m", "benchmarks.peers", python=python).output.split("\n")
     with tempfile.TemporaryDirectory() as folder:
 
-        def run(name: str, weights: Path, words: Sequence[str]) -> None:
-            process = run_process("-m", *words)
+        def run(name: str, weights: Path, words: Sequence[str], python: str) -> None:
+            process = run_process("-m", *words, python=python)
             done.setdefault(name, []).append((process, weights))
             print(f"{name} {process.seconds:.1f} s", flush=True)
 
-        for seed in map(str, range(runs)):
+        for seed in map(str, range(int(runs))):
             out = Path(folder) / seed
             run(
                 "this package",
                 out / "pendulum_weight.h5",
                 ["keras_pendulum.train", "--seed", seed, "--out", str(out)],
+                sys.executable,
             )
-            for name, (library, module) in PEERS.items():
-                if importlib.util.find_spec(module):
+            for package, library in PEERS.items():
+                if any(line.startswith(package) for line in installed):
                     weights = Path(folder) / f"{library}{seed}.npz"
-                    run(name, weights, ["benchmarks.peers", library, seed, str(weights)])
+                    run(package, weights, ["benchmarks.peers", library, seed, str(weights)], python)
         regrets = {name: [regret(weights) for _, weights in each] for name, each in done.items()}
 
     ours = median([process.seconds for process, _ in done["this package"]], 3)
@@ -73,11 +75,11 @@ def main(runs: int = 3) -> None:
                 "mean regret": round(float(np.mean(regrets[name])), 1),
                 "worst regret": round(max(regrets[name]), 1),
                 "peak memory, MB": round(max(process.peak_memory for process, _ in each)),
-                "runs": runs,
+                "runs": int(runs),
             }
         )
-    write("learning", "python -m benchmarks.learning", rows, peers=True)
+    write("learning", "python -m benchmarks.learning", rows, also=list(filter(None, installed)))
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main(*sys.argv[1:])

@@ -1,5 +1,6 @@
 """The task of `reference` done by other libraries, with the same numbers.
 
+    python -m benchmarks.peers              # which of them are installed
     python -m benchmarks.peers sb3|sbx SEED OUT.npz
 
 Trains a DQN of Stable-Baselines3 (PyTorch) or of sbx (JAX) and keeps the network's weights in
@@ -19,6 +20,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.report import versions
 from keras_pendulum.environment import make_environment
 from keras_pendulum.presets import Config, preset
 from keras_pendulum.torque import TorqueGrid
@@ -129,8 +131,11 @@ def train_sbx(config: Config) -> list[NDArray[np.float32]]:
     return [np.asarray(array) for array in arrays]
 
 
-def main(library: str, seed: str, out: str) -> None:
-    """Trains and keeps the weights."""
+def main(library: str | None = None, seed: str = "0", out: str = "") -> None:
+    """Trains and keeps the weights, or names what is installed."""
+    if library is None:
+        print("\n".join(versions(["stable-baselines3", "torch", "sbx-rl", "jax"])))
+        return
     train = {"sb3": train_sb3, "sbx": train_sbx}[library]
     np.savez(out, *train(preset("reference", seed=int(seed))))
 

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 
 RESULTS = Path(__file__).parent / "results"
 _PACKAGES = ("tensorflow-cpu", "tensorflow", "keras", "gymnasium", "numpy")
-_PEERS = ("torch", "stable-baselines3", "sbx-rl", "jax")
 
 Row = dict[str, Any]
 
@@ -30,12 +29,12 @@ class Process(NamedTuple):
     output: str
 
 
-def run_process(*words: str) -> Process:
+def run_process(*words: str, python: str = sys.executable) -> Process:
     """Runs `python WORDS` and waits for it. Raises CalledProcessError when it fails."""
-    command = [sys.executable, *words]
+    command = [python, *words]
     with tempfile.TemporaryFile("w+") as output:
         started = time.perf_counter()
-        process = subprocess.Popen(command, stdout=output, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(command, stdout=output)
         _, status, usage = os.wait4(process.pid, 0)
         seconds = time.perf_counter() - started
         process.returncode = os.waitstatus_to_exitcode(status)
@@ -51,7 +50,18 @@ def median(values: Sequence[float], digits: int = 1) -> float:
     return round(statistics.median(values), digits)
 
 
-def machine(*, peers: bool = False) -> str:
+def versions(packages: Sequence[str]) -> list[str]:
+    """Those of `packages` that are installed, with their versions."""
+    found = []
+    for package in packages:
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def machine() -> str:
     """This machine and what runs on it, in one line."""
     model = platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
@@ -59,12 +69,7 @@ def machine(*, peers: bool = False) -> str:
         names = [line for line in cpuinfo.read_text().splitlines() if line.startswith("model name")]
         model = names[0].split(":")[1].strip() if names else model
     parts = [f"{os.cpu_count()} cores of {model}", f"Python {platform.python_version()}"]
-    for package in _PACKAGES + (_PEERS if peers else ()):
-        try:
-            parts.append(f"{package} {version(package)}")
-        except PackageNotFoundError:
-            continue
-    return ", ".join(parts)
+    return ", ".join(parts + versions(_PACKAGES))
 
 
 def markdown(rows: Sequence[Row]) -> str:
@@ -74,10 +79,13 @@ def markdown(rows: Sequence[Row]) -> str:
     return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
 
 
-def write(name: str, command: str, rows: Sequence[Row], *, peers: bool = False) -> str:
-    """Writes the rows as JSON and Markdown to benchmarks/results; returns the Markdown table."""
+def write(name: str, command: str, rows: Sequence[Row], *, also: Sequence[str] = ()) -> str:
+    """Writes the rows as JSON and Markdown to benchmarks/results; returns the Markdown table.
+
+    `also` are packages, with versions, that took part beside the ones in this environment.
+    """
     RESULTS.mkdir(exist_ok=True)
-    where = machine(peers=peers)
+    where = ", ".join([machine(), *also])
     content = {"command": command, "machine": where, "rows": list(rows)}
     (RESULTS / f"{name}.json").write_text(
         json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"

@@ -25,11 +25,16 @@ class GreedyPolicy:
 
     def q_values(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Q-values [A] of an observation [3], or [B, A] of [B, 3]."""
+        # `dot` and sums in place, because for one observation the calls cost as much as the work.
         features = observation
         for kernel, bias in self._hidden:
-            features = self._activate(features @ kernel + bias)
+            features = features.dot(kernel)
+            features += bias
+            self._activate(features, out=features)
         kernel, bias = self._head
-        return features @ kernel + bias
+        q = features.dot(kernel)
+        q += bias
+        return q
 
     def action(self, observation: NDArray[np.float32]) -> int:
         """The index of the action with the highest value; the lowest index among equals."""

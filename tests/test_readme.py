@@ -13,21 +13,19 @@ import h5py
 import pytest
 
 import keras_pendulum as kp
-from benchmarks.departures import departures
+from benchmarks.departures import BEFORE, departures, measured
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-DEPARTURES: dict[str, list[float]] = json.loads(
-    (ROOT / "benchmarks" / "departures.json").read_text()
-)
+ROWS = [(preset, name) for preset in BEFORE for name in departures(preset)]
 COMMANDS = sorted(
     {match.strip() for match in re.findall(r"python -m keras_pendulum\.[^\n`#&]+", README)}
 )
 
 
-def table_of_departures() -> dict[str, list[str]]:
+def table_of_departures(preset: str) -> dict[str, list[str]]:
     """Setting -> the other cells of its row."""
-    table = README.split("departures.json -->")[1].split("\n\n")[0].strip().splitlines()
+    table = README.split(f"departures_{preset}.json -->")[1].split("\n\n")[0].strip().splitlines()
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[2:]]
     return {row[0].strip("`"): row[1:] for row in rows}
 
@@ -36,12 +34,9 @@ def summary(regrets: list[float]) -> str:
     return f"mean {sum(regrets) / len(regrets):.1f}, worst {max(regrets):.1f}"
 
 
-def test_the_table_names_every_departure_and_no_other() -> None:
-    assert list(table_of_departures()) == departures()
-
-
-def test_the_learning_that_was_measured_is_as_good_as_promised() -> None:
-    assert max(DEPARTURES["reference"][:3]) <= 8
+@pytest.mark.parametrize("preset", BEFORE)
+def test_the_table_names_every_departure_and_no_other(preset: str) -> None:
+    assert list(table_of_departures(preset)) == departures(preset)
 
 
 def test_the_shipped_policy_is_as_good_as_the_figures_say() -> None:
@@ -57,19 +52,21 @@ def test_the_shipped_policy_is_as_good_as_the_figures_say() -> None:
         assert float(found.group(1)) == pytest.approx(figure, abs=0.015)
 
 
-@pytest.mark.parametrize("name", table_of_departures())
-def test_a_row_has_the_presets_values_and_the_measured_regret(name: str) -> None:
-    original, reference, why, measured = table_of_departures()[name]
-    assert original.replace(" ", "") == str(getattr(kp.preset("original"), name))
-    assert reference.replace(" ", "") == str(getattr(kp.preset("reference"), name))
+@pytest.mark.parametrize(("preset", "name"), ROWS)
+def test_a_row_has_the_presets_values_and_the_measured_regret(preset: str, name: str) -> None:
+    before, after, why, regret = table_of_departures(preset)[name]
+    assert before.replace(" ", "") == str(getattr(kp.preset(BEFORE[preset]), name))
+    assert after.replace(" ", "") == str(getattr(kp.preset(preset), name))
     assert len(why) > 20
-    assert measured == summary(DEPARTURES[name])
+    assert regret == summary(measured(preset)[name])
 
 
-def test_the_text_beside_the_table_has_the_measured_regrets_too() -> None:
+@pytest.mark.parametrize("preset", BEFORE)
+def test_the_text_beside_a_table_has_the_measured_regrets_too(preset: str) -> None:
     flowing = " ".join(README.split())
-    assert f"With all of them it is {summary(DEPARTURES['reference'])};" in flowing
-    assert f"the original's is {summary(DEPARTURES['original'])}." in flowing
+    regrets = measured(preset)
+    assert f"with all of them it is {summary(regrets[preset])};" in flowing
+    assert f"of `{BEFORE[preset]}` {summary(regrets[BEFORE[preset]])}." in flowing
 
 
 def test_the_regrets_of_the_first_seeds_are_the_measured_ones() -> None:
@@ -79,7 +76,8 @@ def test_the_regrets_of_the_first_seeds_are_the_measured_ones() -> None:
         re.DOTALL,
     )
     assert found is not None
-    assert [round(float(figure), 1) for figure in found.groups()] == DEPARTURES["reference"][:3]
+    regrets = measured("reference")["reference"]
+    assert [round(float(figure), 1) for figure in found.groups()] == regrets[:3]
 
 
 @pytest.mark.parametrize("line", COMMANDS)
