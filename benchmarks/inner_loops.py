@@ -10,12 +10,12 @@ two sides of a row in turns.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-import tensorflow as tf
 
 import keras_pendulum as kp
 from benchmarks.report import median, versions, write
@@ -54,7 +54,7 @@ def products(batch_size: int) -> Callable[[], object]:
     """The matrix products of as many updates, and nothing else."""
     import torch
 
-    torch.set_num_threads(int(tf.config.threading.get_intra_op_parallelism_threads()))
+    torch.set_num_threads(int(os.environ["TF_NUM_INTRAOP_THREADS"]))  # as TensorFlow has
     config = kp.preset("reference")
     sizes = (3, *config.hidden_units, config.torque_count)
     kernels = [torch.randn(a, b) for a, b in pairwise(sizes)]

@@ -48,7 +48,7 @@ class Agent:
         self.double_q = double_q
         self.random = random
         optimizer.build(online.trainable_variables)
-        self._compiled_updates = tf.function(self._updates, jit_compile=True)
+        self._compiled_updates = tf.function(self._updates, jit_compile=True, autograph=False)
         self._greedy = GreedyPolicy(online)
 
     def select_action(self, observation: NDArray[np.float32], epsilon: float) -> int:
@@ -67,11 +67,7 @@ class Agent:
         return losses.numpy()
 
     def _updates(self, batches: Transitions) -> tf.Tensor:
-        count = batches.action.shape[0]
-        losses = tf.TensorArray(tf.float32, count)
-        for k in tf.range(count):
-            losses = losses.write(k, self.learn(Transitions(*(each[k] for each in batches))))
-        return losses.stack()  # [K]
+        return tf.scan(lambda _, batch: self.learn(batch), batches, initializer=0.0)  # [K]
 
     def learn(self, batch: Transitions) -> tf.Tensor:
         """One update from a batch [B, ...]; returns its loss, a scalar."""

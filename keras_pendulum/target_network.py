@@ -50,4 +50,3 @@ def hard_update(period: int) -> TargetUpdate:
 
 def _no_update(online: DQN, target: DQN, updates: tf.Tensor) -> None:
     """Right where the target network *is* the online network."""
-    tf.no_op()  # AutoGraph cannot read a function without a body
