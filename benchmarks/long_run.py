@@ -41,7 +41,7 @@ def main(episodes: int = 5000) -> None:
     config = kp.preset("reference", episodes=episodes)
     with tempfile.TemporaryDirectory() as folder:
         kp.train_dqn(config, Path(folder) / "run", listeners=[watch])
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
     rows = []
     for name, first in (("early", WINDOW), ("at the end", episodes - WINDOW)):
         window = slice(first, first + WINDOW)

@@ -42,7 +42,7 @@ def run_process(*words: str, python: str = sys.executable) -> Process:
         text = output.read()
     if process.returncode != 0:
         raise subprocess.CalledProcessError(process.returncode, command, text)
-    return Process(seconds, usage.ru_maxrss / 1000, text)
+    return Process(seconds, usage.ru_maxrss * 1024 / 1e6, text)
 
 
 def median(values: Sequence[float], digits: int = 1) -> float:
