@@ -21,8 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import versions
+from keras_pendulum.config import Config
 from keras_pendulum.environment import make_environment
-from keras_pendulum.presets import Config, preset
+from keras_pendulum.presets import preset
 from keras_pendulum.torque import TorqueGrid
 
 
@@ -38,7 +39,7 @@ class DiscreteTorques(gymnasium.ActionWrapper[Any, Any, Any]):
 
     def action(self, action: Any) -> NDArray[np.float64]:
         """The torque [1] in N·m."""
-        return self._torques.torque(int(action))
+        return self._torques.control(int(action))
 
 
 def settings(config: Config) -> dict[str, Any]:

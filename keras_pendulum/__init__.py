@@ -14,11 +14,12 @@ from keras_pendulum.backend import prepare_environment, quick_import, require_te
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from keras_pendulum.config import Config
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
     from keras_pendulum.evaluation import Score, evaluate_policy
     from keras_pendulum.network import DQN
     from keras_pendulum.optimum import optimal_return
-    from keras_pendulum.presets import Config, preset
+    from keras_pendulum.presets import preset
     from keras_pendulum.training import TrainingResult, train_dqn
     from keras_pendulum.weights import find_weights, load_weights, save_weights
 
@@ -44,7 +45,8 @@ _HOMES = {
     "evaluation": ("Score", "evaluate_policy"),
     "network": ("DQN",),
     "optimum": ("optimal_return",),
-    "presets": ("Config", "preset"),
+    "config": ("Config",),
+    "presets": ("preset",),
     "training": ("TrainingResult", "train_dqn"),
     "weights": ("find_weights", "load_weights", "save_weights"),
 }

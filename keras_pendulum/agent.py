@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import keras
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.network import DQN
 from keras_pendulum.policy import GreedyPolicy
-from keras_pendulum.q_learning import double_td_target, mean_squared_error, td_target
+from keras_pendulum.q_learning import double_td_target, td_target
 from keras_pendulum.randomness import RandomSource
 from keras_pendulum.replay import Transitions
 from keras_pendulum.target_network import TargetUpdate
@@ -25,6 +26,7 @@ class Agent:
         target: the network that values the next observations.
         update_target: how `target` follows `online` after each update.
         optimizer: a Keras optimizer for the online network.
+        loss: of Q-values [B, A], actions [B] and targets [B], a scalar.
         discount: γ.
         double_q: whether `online` chooses the next action that `target` values.
         random: source of the exploration draws.
@@ -36,6 +38,7 @@ class Agent:
         target: DQN,
         update_target: TargetUpdate,
         optimizer: keras.optimizers.Optimizer,
+        loss: Callable[[tf.Tensor, tf.Tensor, tf.Tensor], tf.Tensor],
         discount: float,
         double_q: bool,
         random: RandomSource,
@@ -44,30 +47,51 @@ class Agent:
         self.target = target
         self.update_target = update_target
         self.optimizer = optimizer
+        self.loss = loss
         self.discount = discount
         self.double_q = double_q
         self.random = random
         optimizer.build(online.trainable_variables)
         self._compiled_updates = tf.function(self._updates, jit_compile=True, autograph=False)
-        self._greedy = GreedyPolicy(online)
+        # What there is to act on since the last update: a copy of the weights, or one observation
+        # with its Q-values [A].
+        self._greedy: GreedyPolicy | None = None
+        self._valued: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
 
     def select_action(self, observation: NDArray[np.float32], epsilon: float) -> int:
-        """A random action index with probability ε, else the greedy one of observation [3]."""
+        """A random action index with probability ε, else the greedy one of observation [D]."""
         if self.random.uniform() <= epsilon:
             return self.random.action(self.online.action_count)
+        if self._valued is not None and self._valued[0] is observation:
+            return int(self._valued[1].argmax())
+        if self._greedy is None:
+            self._greedy = GreedyPolicy(self.online)
         return self._greedy.action(observation)
 
-    def update(self, batches: Transitions) -> NDArray[np.float32]:
+    def update(
+        self, batches: Transitions, observation: NDArray[np.float32] | None = None
+    ) -> NDArray[np.float32]:
         """Learns from batches [K, B, ...], one after the other; returns the losses [K].
 
-        One compiled call makes all K updates, because a call each costs more than its update.
+        One compiled call makes all K updates, because a call each costs more than its update. It
+        also values `observation` [D], when given, the one to act on next: where an update comes
+        after each step, a copy of the weights would be for a single use.
         """
-        losses = self._compiled_updates(Transitions(*map(tf.convert_to_tensor, batches)))
-        self._greedy = GreedyPolicy(self.online)
+        losses, q = self._compiled_updates(
+            Transitions(*map(tf.convert_to_tensor, batches)),
+            None if observation is None else tf.convert_to_tensor(observation),
+        )
+        self._greedy = None
+        self._valued = None if observation is None else (observation, q.numpy())
         return losses.numpy()
 
-    def _updates(self, batches: Transitions) -> tf.Tensor:
-        return tf.scan(lambda _, batch: self.learn(batch), batches, initializer=0.0)  # [K]
+    def _updates(
+        self, batches: Transitions, observation: tf.Tensor | None
+    ) -> tuple[tf.Tensor, tf.Tensor | None]:
+        losses = tf.scan(lambda _, batch: self.learn(batch), batches, initializer=0.0)  # [K]
+        if observation is None:
+            return losses, None
+        return losses, self.online(observation[tf.newaxis])[0]  # [K], [A]
 
     def learn(self, batch: Transitions) -> tf.Tensor:
         """One update from a batch [B, ...]; returns its loss, a scalar."""
@@ -80,7 +104,7 @@ class Agent:
             target = td_target(*outcome, self.discount)  # [B]
         with tf.GradientTape() as tape:
             q = self.online(batch.observation)  # [B, A]
-            loss = mean_squared_error(q, batch.action, target)
+            loss = self.loss(q, batch.action, target)
         variables = self.online.trainable_variables
         gradients = tape.gradient(loss, variables)
         self.optimizer.apply_gradients(zip(gradients, variables, strict=True))
@@ -105,4 +129,4 @@ class Agent:
             if value.shape != tuple(variable.shape):  # assign would stretch it
                 raise ValueError(f"{variable.name} has shape {value.shape}")
             variable.assign(value)
-        self._greedy = GreedyPolicy(self.online)
+        self._greedy = self._valued = None

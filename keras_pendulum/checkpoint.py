@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from keras_pendulum import layer_files
 from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.config import Config
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import ConfigError, WeightsError
-from keras_pendulum.presets import Config
 from keras_pendulum.run import Run
 from keras_pendulum.weights import weights_file
 
@@ -53,12 +53,13 @@ def load_config(path: str | os.PathLike[str]) -> Config:
         return _config(_state(file, path), path)
 
 
-def load_checkpoint(path: str | os.PathLike[str], config: Config) -> Run:
+def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool = False) -> Run:
     """The run in a checkpoint, ready to go on.
 
     Args:
         path: the checkpoint.
         config: the run's settings; only `episodes` and `save_every` may differ from the file's.
+        render: show the environment in a window.
 
     Raises:
         WeightsError: the file is damaged or holds weights alone.
@@ -80,7 +81,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config) -> Run:
                 f"{path}: this run has {len(rows)} episodes behind it; episodes {config.episodes} "
                 "cannot be its end"
             )
-        run = Run(config)
+        run = Run(config, render=render)
         online = layer_files.read_layers(file, path, run.agent.online.observation_size)
         agent = {name: list(_arrays(file, name, path).values()) for name in ("target", "optimizer")}
         run.agent.set_state(online, agent)

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any, NoReturn
 
+from keras_pendulum.config import Config
 from keras_pendulum.errors import UserError
-from keras_pendulum.presets import Config
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -43,7 +43,7 @@ def add_config_flags(parser: argparse.ArgumentParser, skip: Sequence[str] = ()) 
         if spec.name not in skip:
             group.add_argument(
                 f"--{spec.name.replace('_', '-')}",
-                type=_READERS[str(spec.type)],
+                type=_READERS[str(spec.type).removesuffix(" | None")],
                 choices=spec.metadata["choices"],
                 default=argparse.SUPPRESS,
                 metavar=None if spec.metadata["choices"] else "N",

@@ -1,7 +1,8 @@
-"""The environment: Gymnasium's inverted pendulum."""
+"""The environments: what this package knows of them, and Gymnasium's own beneath."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -10,21 +11,52 @@ if TYPE_CHECKING:
 STEPS_PER_EPISODE = 200  # Pendulum-v1 truncates here and never terminates
 
 
-def make_environment(
-    environment: str, gravity: float, render_mode: str | None = None, steps: int = STEPS_PER_EPISODE
-) -> gymnasium.Env[Any, Any]:
-    """Pendulum-v1 with its gravity in m/s², truncated after `steps` steps.
+@dataclass(frozen=True)
+class Task:
+    """What the package needs to know of an environment before it makes one."""
 
-    Observations [3] are [cos θ, sin θ, θ̇ in rad/s] (θ = 0 upright), an action [1] is a torque in
-    N·m, and a reward is -(θ² + 0.1 θ̇² + 0.001 u²).
+    observation_size: int
+    steps_per_episode: int  # where Gymnasium truncates
+    never_terminates: bool
+    action_count: (
+        int | None
+    )  # of Gymnasium's own actions; None where a torque acts, under a gravity
+    weights_name: str  # of a run's checkpoint
+
+    @property
+    def has_torque(self) -> bool:
+        """Whether it is the pendulum, with torques and a gravity to choose."""
+        return self.action_count is None
+
+
+TASKS = {
+    # Observation [cos θ, sin θ, θ̇ in rad/s], θ = 0 upright; an action [1] is a torque in N·m;
+    # reward -(θ² + 0.1 θ̇² + 0.001 u²).
+    "Pendulum-v1": Task(3, STEPS_PER_EPISODE, True, None, "pendulum_weight.h5"),
+    # Observation [x in m, ẋ in m/s, θ in rad, θ̇ in rad/s], θ = 0 upright; action 0 pushes left, 1
+    # right; reward 1 a step until |θ| > 12° or |x| > 2.4 m terminates.
+    "CartPole-v1": Task(4, 500, False, 2, "cartpole_weight.h5"),
+}
+
+
+def make_environment(
+    environment: str,
+    gravity: float | None,
+    render_mode: str | None = None,
+    steps: int | None = None,
+) -> gymnasium.Env[Any, Any]:
+    """An environment of TASKS, with the pendulum's gravity in m/s² (None for CartPole).
+
+    It truncates after `steps` steps, or where Gymnasium does.
     """
     import gymnasium
 
+    physics = {} if gravity is None else {"g": gravity}
     # The checker wraps every step and finds nothing in an environment of Gymnasium's own.
     return gymnasium.make(
         environment,
-        max_episode_steps=steps,
-        g=gravity,
+        max_episode_steps=steps or TASKS[environment].steps_per_episode,
         render_mode=render_mode,
         disable_env_checker=True,
+        **physics,
     )

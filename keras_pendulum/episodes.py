@@ -1,4 +1,4 @@
-"""The loop: the agent lives through episodes and learns after each; one record an episode."""
+"""The loop: the agent lives through episodes and learns on the way; one record an episode."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import gymnasium
+import numpy as np
+from numpy.typing import NDArray
 
+from keras_pendulum.actions import Actions
 from keras_pendulum.agent import Agent
-from keras_pendulum.exploration import EpsilonDecay
-from keras_pendulum.presets import Config
+from keras_pendulum.config import Config
+from keras_pendulum.exploration import make_schedule
 from keras_pendulum.randomness import RandomSource
 from keras_pendulum.replay import ReplayBuffer
-from keras_pendulum.torque import TorqueGrid
 
 
 class EpisodeRecord(NamedTuple):
@@ -22,8 +24,8 @@ class EpisodeRecord(NamedTuple):
     episode: int  # from 0
     average_reward: float  # a step
     episode_return: float  # undiscounted sum; "return" in history.csv
-    epsilon: float
-    loss: float  # mean over the updates after the episode; NaN when there were none
+    epsilon: float  # of its last step
+    loss: float  # mean over the updates that came with it; NaN when there were none
     environment_steps: int  # since the start of the run
     updates: int  # since the start of the run
     seconds: float  # wall-clock time of this episode with its updates
@@ -38,7 +40,7 @@ class EpisodeRecord(NamedTuple):
 
 def learn_episodes(
     env: gymnasium.Env[Any, Any],
-    torques: TorqueGrid,
+    actions: Actions,
     agent: Agent,
     replay: ReplayBuffer,
     random: RandomSource,
@@ -50,54 +52,51 @@ def learn_episodes(
     The environment is seeded before episode 0 only, as in the recorded run; afterwards its own
     generator goes on.
     """
-    schedule = EpsilonDecay(config.epsilon_start, config.epsilon_decay, config.epsilon_min)
+    schedule = make_schedule(config)
     first = 0 if last is None else last.episode + 1
     updates = 0 if last is None else last.updates
+
+    def learn(count: int, following: NDArray[np.float32] | None = None) -> list[float]:
+        positions = [
+            random.batch_positions(len(replay), config.batch_size) for _ in range(count)
+        ]  # [K, B]
+        return agent.update(replay.at(positions), following).tolist()
+
     for episode in range(first, config.episodes):
         started = time.perf_counter()
-        epsilon = schedule(episode)
         before = replay.added
-        seed = random.seed if episode == 0 else None
-        total = _run_episode(env, torques, agent, replay, epsilon, config.reward_scale, seed)
-        loss = float("nan")
-        if episode > config.learning_starts:
-            positions = [
-                random.batch_positions(len(replay), config.batch_size)
-                for _ in range(config.updates_per_episode)
-            ]  # [K, B]
-            loss = float(agent.update(replay.at(positions)).mean())
-            updates += config.updates_per_episode
+        total = 0.0
+        losses: list[float] = []
+        observation, _ = env.reset(seed=random.seed if episode == 0 else None)
+        over = False
+        while not over:
+            epsilon = schedule(episode, replay.added)
+            action = agent.select_action(observation, epsilon)
+            following, reward, terminated, truncated, _ = env.step(actions.control(action))
+            reward = float(reward)
+            replay.add(
+                observation,
+                actions.remembered_index(action),
+                config.reward_scale * reward,
+                following,
+                terminated,
+            )
+            if config.update_after == "step" and len(replay) >= config.batch_size:
+                losses += learn(1, following)
+            total += reward
+            observation = following
+            over = terminated or truncated
+        due = config.update_after == "episode" and episode > config.learning_starts
+        if due and len(replay) >= config.batch_size:
+            losses += learn(config.updates_per_episode)
+        updates += len(losses)
         yield EpisodeRecord(
             episode=episode,
             average_reward=total / (replay.added - before),
             episode_return=total,
             epsilon=epsilon,
-            loss=loss,
+            loss=float(np.mean(losses)) if losses else float("nan"),
             environment_steps=replay.added,
             updates=updates,
             seconds=time.perf_counter() - started,
         )
-
-
-def _run_episode(
-    env: gymnasium.Env[Any, Any],
-    torques: TorqueGrid,
-    agent: Agent,
-    replay: ReplayBuffer,
-    epsilon: float,
-    reward_scale: float,
-    seed: int | None,
-) -> float:
-    """Acts and remembers until the episode ends; returns the episode return."""
-    observation, _ = env.reset(seed=seed)
-    total = 0.0
-    over = False
-    while not over:
-        action = agent.select_action(observation, epsilon)
-        following, reward, terminated, truncated, _ = env.step(torques.torque(action))
-        remembered = torques.remembered_index(action)
-        total += float(reward)
-        replay.add(observation, remembered, reward_scale * float(reward), following, terminated)
-        observation = following
-        over = terminated or truncated
-    return total

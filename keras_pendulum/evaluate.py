@@ -78,7 +78,7 @@ def _require_no_other_file(path: Path) -> None:
         raise UserError(f"{path} holds something else than a GIF: name another file")
 
 
-def _film(network: DQN, seed: int, gravity: float, path: str) -> None:
+def _film(network: DQN, seed: int, gravity: float | None, path: str) -> None:
     """Writes a GIF of the first episode, every second frame of it."""
     from keras_pendulum import pictures
     from keras_pendulum.atomic_file import write_atomically

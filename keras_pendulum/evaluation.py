@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -11,22 +12,23 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environment import make_environment
+from keras_pendulum.actions import make_actions
+from keras_pendulum.config import checked_setting
+from keras_pendulum.environment import TASKS, make_environment
+from keras_pendulum.errors import ConfigError
 from keras_pendulum.network import DQN
 from keras_pendulum.optimum import optimal_return
 from keras_pendulum.policy import GreedyPolicy
-from keras_pendulum.presets import checked_setting
-from keras_pendulum.torque import TorqueGrid
 
 
 @dataclass(frozen=True)
 class Score:
-    """Undiscounted returns of 200 steps, one an episode."""
+    """Undiscounted returns of whole episodes."""
 
     environment: str
-    gravity: float  # m/s²
+    gravity: float | None  # m/s², the pendulum's
     returns: NDArray[np.float64]  # [episodes]
-    optimal_returns: NDArray[np.float64]  # [episodes], best possible with the 41 torques
+    optimal_returns: NDArray[np.float64]  # [episodes], best possible with 41 torques; or NaN
 
     @property
     def mean_return(self) -> float:
@@ -50,16 +52,17 @@ class Score:
 
     @property
     def optimal_mean_return(self) -> float:
-        """Mean of the best possible returns of the same starts."""
+        """Mean of the best possible returns of the same starts; NaN for CartPole."""
         return float(self.optimal_returns.mean())
 
     @property
     def regret(self) -> float:
-        """Best possible mean return minus the achieved one."""
+        """Best possible mean return minus the achieved one; NaN for CartPole."""
         return self.optimal_mean_return - self.mean_return
 
     def as_json(self) -> dict[str, Any]:
         """The figures that `evaluate --json` prints."""
+        unknown = math.isnan(self.regret)
         return {
             "environment": self.environment,
             "gravity": self.gravity,
@@ -68,17 +71,22 @@ class Score:
             "std_return": self.std_return,
             "median_return": self.median_return,
             "worst_return": self.worst_return,
-            "optimal_mean_return": self.optimal_mean_return,
-            "regret": self.regret,
+            "optimal_mean_return": None if unknown else self.optimal_mean_return,
+            "regret": None if unknown else self.regret,
         }
 
     def summary(self) -> str:
-        """Three lines for people."""
-        return (
-            f"Greedy on {len(self.returns)} fixed starts, {self.environment}, g = {self.gravity:g}"
+        """Three lines for people, or two for CartPole."""
+        gravity = "" if self.gravity is None else f", g = {self.gravity:g}"
+        text = (
+            f"Greedy on {len(self.returns)} fixed starts, {self.environment}{gravity}"
             f": mean return {self.mean_return:.2f} (standard deviation {self.std_return:.2f}, "
             f"median {self.median_return:.2f}, worst {self.worst_return:.2f})\n"
-            f"Best possible on the same starts: {self.optimal_mean_return:.2f}\n"
+        )
+        if math.isnan(self.regret):
+            return f"{text}Highest possible: {TASKS[self.environment].steps_per_episode}"
+        return (
+            f"{text}Best possible on the same starts: {self.optimal_mean_return:.2f}\n"
             f"Regret: {self.regret:.2f}"
         )
 
@@ -98,7 +106,7 @@ def evaluate_policy(
         network: the Q-network; its number of outputs makes the torque grid.
         episodes: how many.
         seed: of the first start.
-        gravity: m/s²; None takes the network's own, or 1 where that is not known.
+        gravity: m/s², the pendulum's; None takes the network's own, or 1 where that is not known.
         render_mode: Gymnasium's, for watching.
         on_step: called with the environment after each reset and each step.
 
@@ -107,33 +115,35 @@ def evaluate_policy(
     episodes = checked_setting("episodes", episodes)
     seed = checked_setting("seed", seed)
     checked_setting("seed", seed + episodes - 1)
-    if gravity is None:
-        gravity = 1.0 if network.origin.gravity is None else network.origin.gravity
-    gravity = checked_setting("gravity", gravity)
-    env = make_environment(network.origin.environment, gravity, render_mode)
+    environment = network.origin.environment
+    if TASKS[environment].has_torque:
+        known = 1.0 if network.origin.gravity is None else network.origin.gravity
+        gravity = checked_setting("gravity", known if gravity is None else gravity)
+    elif gravity is not None:
+        raise ConfigError(f"gravity belongs to Pendulum-v1; {environment} has none to set")
+    env = make_environment(environment, gravity, render_mode)
     policy = GreedyPolicy(network)
-    torques = TorqueGrid(network.action_count)
+    actions = make_actions(environment, network.action_count)
     seeds = range(seed, seed + episodes)
 
-    def act(observation: NDArray[np.float32]) -> NDArray[np.float64]:
-        return torques.torque(policy.action(observation))
+    def act(observation: NDArray[np.float32]) -> Any:
+        return actions.control(policy.action(observation))
 
     returns = [_episode_return(env, start, act, on_step) for start in seeds]
     env.close()
-    return Score(
-        network.origin.environment, gravity, np.array(returns), optimal_return(gravity, seeds)
-    )
+    best = np.full(episodes, np.nan) if gravity is None else optimal_return(gravity, seeds)
+    return Score(environment, gravity, np.array(returns), best)
 
 
 @cache
-def random_return(environment: str, gravity: float, episodes: int = 100) -> float:
-    """Mean return of uniformly random torques from the starts of seeds 0, 1, …: the floor."""
+def random_return(environment: str, gravity: float | None, episodes: int = 100) -> float:
+    """Mean return of uniformly random actions from the starts of seeds 0, 1, …: the floor."""
     env = make_environment(environment, gravity)
-    torques = TorqueGrid()
+    actions = make_actions(environment, None)
     random = np.random.RandomState(0)
 
-    def act(observation: NDArray[np.float32]) -> NDArray[np.float64]:
-        return torques.torque(random.randint(torques.count))
+    def act(observation: NDArray[np.float32]) -> Any:
+        return actions.control(random.randint(actions.count))
 
     returns = [_episode_return(env, start, act) for start in range(episodes)]
     return float(np.mean(returns))
@@ -142,7 +152,7 @@ def random_return(environment: str, gravity: float, episodes: int = 100) -> floa
 def _episode_return(
     env: gymnasium.Env[Any, Any],
     seed: int,
-    act: Callable[[NDArray[np.float32]], NDArray[np.float64]],
+    act: Callable[[NDArray[np.float32]], Any],
     on_step: Callable[[gymnasium.Env[Any, Any]], None] = lambda env: None,
 ) -> float:
     observation, _ = env.reset(seed=seed)

@@ -1,9 +1,10 @@
-"""The Q-network: observations in, one value for each torque out."""
+"""The Q-network: observations in, one value for each action out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import keras
@@ -21,10 +22,11 @@ class Origin:
 
 
 class DQN(keras.Model):
-    """The original's network: Dense layers with tanh, then one linear output for each action.
+    """The originals' network: Dense layers, then one linear output for each action.
 
     It is built when it is made, so that no weights can be copied into or out of it before they
-    exist. Initial weights (Glorot uniform, Keras's default) follow from `seed` alone.
+    exist. Initial weights follow from `seed` alone: `glorot`, uniform within
+    ±√(6 / (inputs + outputs)) with biases 0, or `fan-in`, uniform within ±1/√inputs, biases too.
     """
 
     def __init__(
@@ -34,6 +36,7 @@ class DQN(keras.Model):
         *,
         observation_size: int = 3,
         activation: str = "tanh",
+        initial_weights: str = "glorot",
         seed: int = 0,
         origin: Origin | None = None,
     ) -> None:
@@ -45,12 +48,20 @@ class DQN(keras.Model):
         self.origin = origin or Origin()
         seeds = keras.random.SeedGenerator(seed)
 
-        def dense(units: int, activation: str | None) -> keras.layers.Dense:
-            initializer = keras.initializers.GlorotUniform(seed=seeds)
-            return keras.layers.Dense(units, activation, kernel_initializer=initializer)
+        def dense(inputs: int, units: int, activation: str | None) -> keras.layers.Dense:
+            kernel: Any = keras.initializers.GlorotUniform(seed=seeds)
+            bias: Any = "zeros"
+            if initial_weights == "fan-in":
+                limit = inputs**-0.5
+                kernel = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
+                bias = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
+            return keras.layers.Dense(
+                units, activation, kernel_initializer=kernel, bias_initializer=bias
+            )
 
-        self.hidden = [dense(units, activation) for units in hidden_units]
-        self.head = dense(action_count, None)
+        widths = (observation_size, *hidden_units)
+        self.hidden = [dense(inputs, units, activation) for inputs, units in pairwise(widths)]
+        self.head = dense(widths[-1], action_count, None)
         self.build((None, observation_size))
 
     def build(self, input_shape: tuple[int | None, int]) -> None:
@@ -62,7 +73,7 @@ class DQN(keras.Model):
         self.built = True
 
     def call(self, observation: Any) -> Any:
-        """Q-values [B, A] of observations [B, 3] = [cos θ, sin θ, θ̇ in rad/s]."""
+        """Q-values [B, A] of observations [B, D] (what they hold: environment.py)."""
         features = observation
         for layer in self.hidden:
             features = layer(features)

@@ -5,12 +5,18 @@ One observation is so little work that any call into TensorFlow costs many times
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-_ACTIVATIONS = {"tanh": np.tanh}
+
+def _relu(features: NDArray[np.float32], out: NDArray[np.float32]) -> None:
+    np.maximum(features, 0, out=out)
+
+
+ACTIVATIONS: dict[str, Callable[..., Any]] = {"tanh": np.tanh, "relu": _relu}
 
 
 class GreedyPolicy:
@@ -21,10 +27,10 @@ class GreedyPolicy:
         weights = network.get_weights()
         self._hidden = list(zip(weights[:-2:2], weights[1:-2:2], strict=True))
         self._head = weights[-2:]
-        self._activate = _ACTIVATIONS[network.activation]
+        self._activate = ACTIVATIONS[network.activation]
 
     def q_values(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Q-values [A] of an observation [3], or [B, A] of [B, 3]."""
+        """Q-values [A] of an observation [D], or [B, A] of [B, D]."""
         # `dot` and sums in place, because for one observation the calls cost as much as the work.
         features = observation
         for kernel, bias in self._hidden:

@@ -72,3 +72,22 @@ def mean_squared_error(q: tf.Tensor, action: tf.Tensor, target: tf.Tensor) -> tf
     taken = tf.one_hot(action, q.shape[1], on_value=True, off_value=False)  # [B, A]
     target_q = tf.where(taken, target[:, tf.newaxis], tf.stop_gradient(q))  # [B, A]
     return tf.reduce_mean(tf.square(target_q - q))
+
+
+def huber(q: tf.Tensor, action: tf.Tensor, target: tf.Tensor) -> tf.Tensor:
+    """The notebooks' loss: Huber's, δ = 1, of the taken actions' errors, averaged over the batch.
+
+    Half the square of an error up to 1, its absolute value less 1/2 beyond (Mnih et al. 2015,
+    Methods, "error clipping").
+
+    Args:
+        q: [B, A] float32, the online network's values.
+        action: [B] int32.
+        target: [B] float32.
+
+    Returns:
+        scalar float32.
+    """
+    error = tf.gather(q, action, batch_dims=1) - target  # [B]
+    size = tf.abs(error)
+    return tf.reduce_mean(tf.where(size < 1.0, 0.5 * tf.square(error), size - 0.5))

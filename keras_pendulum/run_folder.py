@@ -10,19 +10,30 @@ from dataclasses import asdict
 from pathlib import Path
 
 from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.config import Config
+from keras_pendulum.environment import TASKS
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import UserError
-from keras_pendulum.presets import Config
 
 _COLUMNS = ["return" if name == "episode_return" else name for name in EpisodeRecord._fields]
 
 
 class RunFolder:
-    """Names the files of a run and writes the plain-text ones."""
+    """Names the files of a run and writes the plain-text ones.
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    Args:
+        path: the folder.
+        environment: that of the run; None takes it from the checkpoint that lies there.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], environment: str | None = None) -> None:
         self.path = Path(path)
-        self.weights = self.path / "pendulum_weight.h5"
+        self._checkpoints = [self.path / task.weights_name for task in TASKS.values()]
+        if environment is not None:
+            self.weights = self.path / TASKS[environment].weights_name
+        else:
+            there = [file for file in self._checkpoints if file.exists()]
+            self.weights = there[0] if there else self._checkpoints[0]
         self.history = self.path / "history.csv"
         self.config = self.path / "config.json"
         self.picture = self.path / "rewards.png"
@@ -42,12 +53,18 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
-        used = [file.name for file in self.files if file.exists()]
+        others = [file for file in self._checkpoints if file != self.weights]
+        used = [file.name for file in (*self.files, *others) if file.exists()]
         if used and not overwrite:
             raise UserError(
                 f"{self.path} already holds a run ({', '.join(used)}): go on with it by --resume, "
                 "replace it by --overwrite, or name another folder by --out"
             )
+        for file in others:  # no policy of the replaced run stays beside the new one's
+            try:
+                file.unlink(missing_ok=True)
+            except OSError as error:
+                raise UserError(f"cannot replace {file}: {error.strerror}") from error
 
     def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
         """Writes the settings, and the history of the episodes before a resumed run goes on.

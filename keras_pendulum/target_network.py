@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import tensorflow as tf
 
+from keras_pendulum.config import Config
 from keras_pendulum.network import DQN
-from keras_pendulum.presets import Config
 
 # Called after every update, inside the compiled loop, with the online network, the target
 # network, and the number of updates made so far (a scalar integer tensor).

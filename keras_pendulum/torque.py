@@ -23,7 +23,7 @@ class TorqueGrid:
         """Number of actions A."""
         return len(self.torques)
 
-    def torque(self, index: int) -> NDArray[np.float64]:
+    def control(self, index: int) -> NDArray[np.float64]:
         """The action `index` as the environment takes it: [1], N·m.
 
         float64, as the original sends it: a float32 torque changes the physics' last digits.

@@ -21,11 +21,14 @@ from keras_pendulum.command_line import (
     run_command,
     typed_settings,
 )
+from keras_pendulum.config import Config
+from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
-from keras_pendulum.presets import PRESETS, Config, preset
+from keras_pendulum.presets import PRESETS, preset
 
 if TYPE_CHECKING:
     from keras_pendulum.episodes import EpisodeRecord
+    from keras_pendulum.live_plot import LivePlot
     from keras_pendulum.run_folder import RunFolder
     from keras_pendulum.training import TrainingResult
 
@@ -36,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Parses the command line and trains; returns the exit status."""
     parser = OneLineParser(
         prog="python -m keras_pendulum.train",
-        description="Train a DQN to hold a pendulum up, and say how good it has become.",
+        description="Train a DQN to hold a pendulum or a pole up, and say how good it has become.",
         epilog="Ctrl-C saves a checkpoint; --resume goes on from it.",
     )
     parser.add_argument("--preset", type=name, help=f"{', '.join(PRESETS)} [reference]")
@@ -47,6 +50,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     rerun = parser.add_mutually_exclusive_group()
     rerun.add_argument("--resume", action="store_true", help="go on from DIR's last checkpoint")
     rerun.add_argument("--overwrite", action="store_true", help="replace the run that DIR holds")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--live", action="store_true", help="draw the returns while they come")
+    shown.add_argument("--render", action="store_true", help="show the environment in a window")
     add_config_flags(parser, skip=["preset"])
     arguments = parser.parse_args(argv)
     return run_command(lambda: _train(arguments))
@@ -59,6 +65,9 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.resume and arguments.init:
         raise UserError("--init starts a new run, --resume goes on with one: give one of them")
     require_tensorflow()
+    if arguments.render:
+        require_display()
+    live = _live_plot() if arguments.live else None
 
     with quick_import():
         from keras_pendulum.checkpoint import load_config
@@ -80,11 +89,24 @@ def _train(arguments: argparse.Namespace) -> int:
             init=init,
             overwrite=arguments.overwrite,
             resume=arguments.resume,
-            listeners=[_progress(config), interrupt.listen],
+            render=arguments.render,
+            listeners=[_progress(config), interrupt.listen, *([live] if live else [])],
             should_stop=lambda: interrupt.asked,
         )
-    _print_summary(result, RunFolder(out), time.perf_counter() - started)
+    if live:
+        live.finish()
+    _print_summary(result, RunFolder(out, config.environment), time.perf_counter() - started)
     return 0 if result.finished else 130
+
+
+def _live_plot() -> LivePlot | None:
+    from keras_pendulum.live_plot import LivePlot
+
+    try:
+        return LivePlot()
+    except UserError as error:
+        print(f"no live plot: {error}; the training goes on", file=sys.stderr)
+        return None
 
 
 class _Interrupt:
@@ -152,7 +174,7 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
         score = evaluate_policy(result.network, _EVALUATION_EPISODES)
         print(score.summary())
         chance = random_return(score.environment, score.gravity, _EVALUATION_EPISODES)
-        print(f"Uniformly random torque on the same starts: {chance:.2f}")
+        print(f"Uniformly random actions on the same starts: {chance:.2f}")
     saved = ", ".join(file.name for file in folder.files if file.exists())
     print(f"Saved in {folder.path}: {saved}")
     if not result.finished:

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from keras_pendulum import pictures
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.checkpoint import load_checkpoint, save_checkpoint
-from keras_pendulum.environment import STEPS_PER_EPISODE
+from keras_pendulum.config import Config
+from keras_pendulum.environment import TASKS
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import UserError
 from keras_pendulum.evaluation import random_return
 from keras_pendulum.network import DQN
 from keras_pendulum.optimum import optimal_return
-from keras_pendulum.presets import Config
 from keras_pendulum.run import Run
 from keras_pendulum.run_folder import RunFolder
 
@@ -35,6 +35,7 @@ def train_dqn(
     out: str | os.PathLike[str] | None = None,
     *,
     init: DQN | None = None,
+    render: bool = False,
     overwrite: bool = False,
     resume: bool = False,
     listeners: Iterable[Callable[[EpisodeRecord], None]] = (),
@@ -46,6 +47,7 @@ def train_dqn(
         config: the settings; `preset` gives them.
         out: a folder for checkpoint, history, settings and picture; None keeps nothing.
         init: a network whose weights to start from.
+        render: show the environment in a window, at its own speed.
         overwrite: replace a run that `out` already holds.
         resume: go on from the checkpoint in `out`; `config` may only change `episodes` and
             `save_every`.
@@ -57,13 +59,13 @@ def train_dqn(
         WeightsError: the checkpoint to resume from is damaged.
         UserError: `out` is in use or cannot be written, or the loss is no longer finite.
     """
-    folder = None if out is None else RunFolder(out)
+    folder = None if out is None else RunFolder(out, config.environment)
     if resume:
         if folder is None:
             raise UserError("resume needs the folder of the run to go on with")
-        run = load_checkpoint(folder.weights, config)
+        run = load_checkpoint(folder.weights, config, render)
     else:
-        run = Run(config, init)
+        run = Run(config, init, render)
         if folder is not None:
             folder.claim(overwrite)
             # Before the other files, so that no policy of another run lies beside them, and so
@@ -93,11 +95,18 @@ def train_dqn(
     if folder is not None:
         save_checkpoint(run, folder.weights)
         if finished:
-            levels = {}
-            if config.episode_steps == STEPS_PER_EPISODE:  # else they are not of the same steps
-                levels = {
-                    "best possible": float(optimal_return(config.gravity, range(1000)).mean()),
-                    "random torque": random_return(config.environment, config.gravity),
-                }
-            write_atomically(folder.picture, pictures.learning_curve(run.history, levels))
+            picture = pictures.learning_curve(run.history, config.environment, _levels(config))
+            write_atomically(folder.picture, picture)
     return TrainingResult(run.agent.online, run.history, finished)
+
+
+def _levels(config: Config) -> dict[str, float]:
+    """Mean returns to compare a training episode's with, by name."""
+    task = TASKS[config.environment]
+    if config.episode_steps != task.steps_per_episode:
+        return {}  # they would not be of the same steps
+    levels = {}
+    if config.gravity is not None:
+        levels["best possible"] = float(optimal_return(config.gravity, range(1000)).mean())
+    levels["random actions"] = random_return(config.environment, config.gravity)
+    return levels

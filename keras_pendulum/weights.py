@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 from keras_pendulum import __version__, layer_files
 from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.config import checked_setting
+from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import ConfigError, WeightsError
 from keras_pendulum.network import DQN, Origin
-from keras_pendulum.presets import checked_setting
+from keras_pendulum.policy import ACTIVATIONS
 
 _ORIGIN = "keras_pendulum"  # our group beside the layers; Keras ignores it
 _OPTIONAL = ("gravity", "preset", "seed", "config")  # of Origin: left out where not known
@@ -79,14 +81,22 @@ def load_weights(path: str | os.PathLike[str]) -> DQN:
         WeightsError: the file is missing, damaged, or not such a network; says what is wrong.
     """
     with layer_files.opened(path) as file:
-        layers = layer_files.read_layers(file, path, inputs=3)  # cos θ, sin θ, θ̇
         activation, origin = _read_origin(file, path)
+        task = TASKS[origin.environment]
+        layers = layer_files.read_layers(file, path, task.observation_size)
     kernels = layers[::2]
-    if kernels[-1].shape[1] < 2:
-        raise WeightsError(f"{path}: the network has one output; expected one for each torque")
+    outputs = kernels[-1].shape[1]
+    if outputs < 2:
+        raise WeightsError(f"{path}: the network has one output; expected one for each action")
+    if task.action_count not in (None, outputs):
+        raise WeightsError(
+            f"{path}: the network has {outputs} outputs; {origin.environment} has "
+            f"{task.action_count} actions"
+        )
     network = DQN(
         [kernel.shape[1] for kernel in kernels[:-1]],
-        kernels[-1].shape[1],
+        outputs,
+        observation_size=task.observation_size,
         activation=activation,
         origin=origin,
     )
@@ -97,11 +107,13 @@ def load_weights(path: str | os.PathLike[str]) -> DQN:
 def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Origin]:
     about = file[_ORIGIN].attrs if _ORIGIN in file else {}
     activation = about.get("activation", "tanh")
-    if activation != "tanh":
-        raise WeightsError(f"{path}: records the activation {activation!r}; expected 'tanh'")
+    if activation not in ACTIVATIONS:
+        raise WeightsError(
+            f"{path}: records the activation {activation!r}; expected {' or '.join(ACTIVATIONS)}"
+        )
     environment = about.get("environment", "Pendulum-v1")
-    if environment != "Pendulum-v1":
-        raise WeightsError(f"{path}: belongs to {environment!r}; expected 'Pendulum-v1'")
+    if environment not in TASKS:
+        raise WeightsError(f"{path}: belongs to {environment!r}; expected {' or '.join(TASKS)}")
     gravity = about.get("gravity")
     if gravity is not None:
         try:

@@ -39,7 +39,7 @@ def recorded_memory(recorded: Recorded) -> ReplayBuffer:
     for step, action in enumerate(recorded["action_index"].tolist()):
         if step % STEPS_PER_EPISODE == 0:
             observation, _ = env.reset(seed=1 if step == 0 else None)
-        following, reward, terminated, _, _ = env.step(torques.torque(action))
+        following, reward, terminated, _, _ = env.step(torques.control(action))
         memory.add(observation, action, float(reward), following, terminated)
         observation = following
     return memory

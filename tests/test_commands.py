@@ -64,7 +64,7 @@ def test_train_prints_a_line_an_episode_and_says_how_good_it_is(
     assert "best possible" in done.stdout.lower()
     assert "Greedy on 100 fixed starts" in done.stdout
     assert "Regret: " in done.stdout
-    assert "random torque on the same starts: -920.87" in done.stdout
+    assert "random actions on the same starts: -920.87" in done.stdout
     folder = tmp_path / "runs" / "reference-seed4"
     assert (folder / "pendulum_weight.h5").exists()
     assert kp.load_weights(folder / "pendulum_weight.h5").hidden_units == (16, 8)
@@ -122,6 +122,38 @@ def test_evaluate_for_people(command: Command) -> None:
     assert "Regret: " in done.stdout
 
 
+@pytest.fixture
+def cartpole_file(tmp_path: Path) -> Path:
+    """An untrained CartPole network."""
+    config = kp.preset("cartpole-original", episodes=1)
+    path = tmp_path / "pole.h5"
+    kp.save_weights(kp.train_dqn(config).network, path)
+    return path
+
+
+def test_evaluate_knows_cartpole_by_the_file(command: Command, cartpole_file: Path) -> None:
+    printed = command("evaluate", cartpole_file, "--episodes", "5", "--json").stdout
+    result = json.loads(printed)
+    assert (result["environment"], result["gravity"]) == ("CartPole-v1", None)
+    assert 8 <= result["worst_return"] <= result["mean_return"] <= 500
+    assert result["optimal_mean_return"] is result["regret"] is None
+    people = command("evaluate", cartpole_file, "--episodes", "5").stdout
+    assert people.startswith("Greedy on 5 fixed starts, CartPole-v1: mean return ")
+    assert people.endswith("Highest possible: 500\n")
+
+
+def test_what_does_not_go_with_cartpole_is_told(command: Command, cartpole_file: Path) -> None:
+    for words, message in (
+        (["evaluate", cartpole_file, "--gravity", "2"], "gravity belongs to Pendulum-v1"),
+        (["train", "--init", cartpole_file], "belongs to CartPole-v1, the settings to Pendulum-v1"),
+    ):
+        done = command(*words)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith("error: ")
+        assert message in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
 def test_evaluate_films_the_first_episode(command: Command, tmp_path: Path) -> None:
     for _ in range(2):  # an older film may be replaced
         done = command("evaluate", RECORDED, "--episodes", "1", "--gif", "film.gif")
@@ -170,6 +202,9 @@ WRONG = [
     (["train", "--init", "missing.h5"], "missing.h5: no such file"),
     (["train", "--init", "text.h5"], "text.h5: not an HDF5 file"),
     (["train", "--init", RECORDED, "--hidden-units", "8"], "layers 512-256-128-41"),
+    (["train", "--preset", "cartpole-original", "--init", RECORDED], "belongs to Pendulum-v1"),
+    (["train", "--preset", "cartpole-original", "--gravity", "1"], "gravity 1.0 belongs to"),
+    (["train", "--environment", "CartPole-v1"], "gravity 1.0 belongs to Pendulum-v1; CartPole-v1"),
     (["train", "--out", "text.h5"], "cannot make the folder text.h5"),
     (["train", "--out", "/proc/nowhere"], "cannot make the folder /proc/nowhere"),
     (["evaluate"], "the following arguments are required: WEIGHTS.h5"),
@@ -181,6 +216,7 @@ WRONG = [
     (["evaluate", RECORDED, "--episodes", "0"], "episodes is 0"),
     (["evaluate", RECORDED, "--seed", "-1"], "seed is -1"),
     (["evaluate", RECORDED, "--gravity", "nan"], "gravity is nan"),
+    (["train", "--live", "--render"], "not allowed with"),
     (["evaluate", RECORDED, "--episodes", "1", "--gif", "no/such/folder.gif"], "cannot write"),
 ]
 

@@ -15,7 +15,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.defects import TruncatingTorqueGrid, truncated_index
 from keras_pendulum.replay import ReplayBuffer, Transitions
-from keras_pendulum.run import Run, make_torques
+from keras_pendulum.run import Run, actions_of
 from keras_pendulum.torque import TorqueGrid
 
 
@@ -26,14 +26,15 @@ def test_torque_offset_the_first_block_pushes_at_full_torque_whatever_the_action
     assert min(old_indices) >= 40
     assert sum(index > 40 for index in old_indices) == 40  # they crash the update
 
-    torques = make_torques(kp.preset("reference"))
-    assert torques.torque(0)[0] == -2
-    assert torques.torque(40)[0] == 2
+    torques = actions_of(kp.preset("reference"))
+    assert isinstance(torques, TorqueGrid)
+    assert torques.control(0)[0] == -2
+    assert torques.control(40)[0] == 2
     assert len(np.unique(torques.torques)) == 41
 
 
 def test_index_truncation_credits_two_torques_to_their_neighbours() -> None:
-    old = make_torques(kp.preset("walkthrough"))
+    old = actions_of(kp.preset("walkthrough"))
     assert isinstance(old, TruncatingTorqueGrid)
     remembered = [old.remembered_index(index) for index in range(41)]
     wrong = {index: kept for index, kept in enumerate(remembered) if kept != index}
@@ -42,7 +43,7 @@ def test_index_truncation_credits_two_torques_to_their_neighbours() -> None:
     single = [truncated_index(np.float32(index / 10 - 2)) for index in range(41)]
     assert {i: kept for i, kept in enumerate(single) if kept != i} == {3: 2, 4: 3, 8: 7}
 
-    new = make_torques(kp.preset("reference"))
+    new = actions_of(kp.preset("reference"))
     assert [new.remembered_index(index) for index in range(41)] == list(range(41))
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.presets import PRESETS, Config
+from keras_pendulum.config import Config
+from keras_pendulum.presets import PRESETS
 
 INF, NAN = float("inf"), float("nan")
 
@@ -85,7 +86,7 @@ def test_an_unknown_setting_is_named() -> None:
         *[("target_blend", value) for value in (-0.1, 1.5, NAN)],
         *[("target_update", value) for value in ("", "sometimes")],
         *[("learning_rate_schedule", value) for value in ("linear",)],
-        *[("environment", value) for value in ("CartPole-v1", "Nonsense-v0")],
+        *[("environment", value) for value in ("Acrobot-v1", "Nonsense-v0")],
         *[("save_every", value) for value in (0, -1)],
         *[("episodes", value) for value in (1.5, True, "12", None, (5,))],
         *[("gravity", value) for value in (True, "1", None, (0.5,))],
@@ -117,3 +118,31 @@ def test_the_swingup_is_the_reference_on_the_standard_task() -> None:
 
 def test_presets_are_listed_by_their_own_name() -> None:
     assert all(config.preset == name for name, config in PRESETS.items())
+
+
+def test_cartpole_original_has_the_notebooks_numbers() -> None:
+    config = kp.preset("cartpole-original")
+    assert (config.environment, config.episodes, config.episode_steps) == ("CartPole-v1", 600, 500)
+    assert (config.hidden_units, config.activation) == ((128, 128), "relu")
+    assert (config.replay_capacity, config.batch_size, config.discount) == (10_000, 128, 0.99)
+    assert (config.optimizer, config.learning_rate, config.weight_decay) == ("adamw", 1e-4, 0.01)
+    assert (config.loss, config.gradient_clip, config.bootstrap) == ("huber", 100, "max")
+    assert (config.epsilon_schedule, config.epsilon_decay_steps) == ("steps", 1000)
+    assert (config.epsilon_start, config.epsilon_min) == (0.9, 0.05)
+    assert (config.update_after, config.learning_rate_schedule) == ("step", "constant")
+    assert (config.target_update, config.target_blend) == ("soft", 0.005)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"gravity": 1.0}, "gravity 1.0 belongs to Pendulum-v1; CartPole-v1 has no torque"),
+        ({"torque_count": 5}, "torque_count 5 belongs to Pendulum-v1"),
+        ({"remembered_action": "truncated"}, "remembered_action truncated belongs to Pendulum-v1"),
+        ({"learning_rate_schedule": "cosine"}, "cosine needs update_after episode"),
+        ({"environment": "Pendulum-v1"}, "gravity is missing; Pendulum-v1 needs it"),
+    ],
+)
+def test_settings_that_do_not_go_together_are_named(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(kp.ConfigError, match=message):
+        kp.preset("cartpole-original", **changes)

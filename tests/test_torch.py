@@ -16,8 +16,9 @@ import torch_agent
 from conftest import Recorded
 from numpy.typing import NDArray
 
+from keras_pendulum.config import Config
 from keras_pendulum.network import DQN
-from keras_pendulum.presets import Config, preset
+from keras_pendulum.presets import preset
 from keras_pendulum.q_learning import mean_squared_error, td_target
 from keras_pendulum.randomness import RandomSource
 from keras_pendulum.replay import ReplayBuffer, Transitions

@@ -16,7 +16,7 @@ def test_the_grid_is_the_originals_linspace() -> None:
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_every_index_comes_back_from_its_torque(count: int, dtype: type[np.floating]) -> None:
     grid = TorqueGrid(count)
-    back = [grid.nearest_index(float(dtype(grid.torque(index)[0]))) for index in range(count)]
+    back = [grid.nearest_index(float(dtype(grid.control(index)[0]))) for index in range(count)]
     assert back == list(range(count))
 
 
@@ -33,7 +33,7 @@ def test_a_torque_off_the_grid_is_refused(torque: float) -> None:
 
 
 def test_the_environment_gets_float64_of_shape_1() -> None:
-    torque = TorqueGrid(41).torque(3)
+    torque = TorqueGrid(41).control(3)
     assert torque.shape == (1,)
     assert torque.dtype == np.float64
     assert torque[0] == pytest.approx(-1.7)

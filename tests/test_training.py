@@ -36,7 +36,7 @@ def assert_same(ours: kp.TrainingResult, theirs: kp.TrainingResult) -> None:
         np.testing.assert_array_equal(mine, yours)
 
 
-@pytest.mark.parametrize("name", ["original", "walkthrough", "reference"])
+@pytest.mark.parametrize("name", ["original", "walkthrough", "reference", "cartpole-original"])
 def test_the_same_seed_twice_is_the_same_run_bit_for_bit(name: str) -> None:
     config = kp.preset(name, **SHORT)
     assert_same(kp.train_dqn(config), kp.train_dqn(config))
@@ -122,12 +122,13 @@ def test_a_used_folder_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
     assert len((tmp_path / "history.csv").read_text().splitlines()) == 4
 
 
-@pytest.mark.parametrize("name", ["original", "walkthrough", "reference"])
+@pytest.mark.parametrize("name", ["original", "walkthrough", "reference", "cartpole-original"])
 def test_a_stopped_and_resumed_run_ends_like_one_never_stopped(name: str, tmp_path: Path) -> None:
     # A small buffer, so that its ring has wrapped round by then.
-    config = kp.preset(name, episodes=50, replay_capacity=3000)
+    config = kp.preset(name, episodes=50, replay_capacity=300 if "cartpole" in name else 3000)
     whole = kp.train_dqn(config, tmp_path / "whole")
-    for last, updates in ((5, 0), (45, 5 * config.updates_per_episode)):
+    assert whole.history[-1].environment_steps > config.replay_capacity
+    for last in (5, 45):
         reached: list[int] = []
 
         def listen(record: Any, reached: list[int] = reached) -> None:
@@ -144,7 +145,7 @@ def test_a_stopped_and_resumed_run_ends_like_one_never_stopped(name: str, tmp_pa
             should_stop=should_stop,
         )
         assert not stopped.finished
-        assert stopped.history[-1].updates == updates
+        assert stopped.history[-1].updates == whole.history[last].updates
     resumed = kp.train_dqn(config, tmp_path / "parts", resume=True)
     assert resumed.finished
     assert_same(resumed, whole)
@@ -186,8 +187,8 @@ def test_the_picture_shows_the_best_possible_above_chance(
 ) -> None:
     drawn: list[tuple[float, float]] = []
 
-    def draw(history: object, returns: dict[str, float]) -> bytes:
-        drawn.append((returns["best possible"], returns["random torque"]))
+    def draw(history: object, environment: str, returns: dict[str, float]) -> bytes:
+        drawn.append((returns["best possible"], returns["random actions"]))
         return b"a picture"
 
     monkeypatch.setattr("keras_pendulum.pictures.learning_curve", draw)
@@ -205,13 +206,13 @@ def test_a_run_killed_in_its_first_episode_leaves_one_run_and_can_be_resumed(
     class KilledError(Exception):
         pass
 
-    def kill(*parts: object) -> float:
+    def kill(*parts: object) -> int:
         raise KilledError
 
     kp.train_dqn(kp.preset("original", seed=9, episodes=2, hidden_units=(8,)), tmp_path)
     config = kp.preset("original", episodes=3, hidden_units=(8,))
     with monkeypatch.context() as patched:
-        patched.setattr("keras_pendulum.episodes._run_episode", kill)
+        patched.setattr("keras_pendulum.agent.Agent.select_action", kill)
         with pytest.raises(KilledError):
             kp.train_dqn(config, tmp_path, overwrite=True)
     assert not (tmp_path / "rewards.png").exists()  # it was the other run's

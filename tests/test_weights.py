@@ -267,12 +267,16 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "declared but not stored": (changed(make_unwritten), "not a plain array"),
     "too wide": (changed(make_too_wide), "expected 1 to 8192"),
     "activation": (
-        changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "relu")),
-        "activation 'relu'",
+        changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "elu")),
+        "activation 'elu'",
     ),
     "environment": (
+        changed(lambda f: f["keras_pendulum"].attrs.__setitem__("environment", "Acrobot-v1")),
+        "belongs to 'Acrobot-v1'",
+    ),
+    "other environment": (
         changed(lambda f: f["keras_pendulum"].attrs.__setitem__("environment", "CartPole-v1")),
-        "belongs to 'CartPole-v1'",
+        "takes 3 inputs; expected 4",
     ),
     "gravity": (
         changed(lambda f: f["keras_pendulum"].attrs.__setitem__("gravity", np.nan)),
