@@ -76,7 +76,7 @@ def test_500_updates_give_the_same_weights(seed: int) -> None:
 
 
 def test_a_last_digit_at_the_corner_of_relu_moves_few_weights_and_no_value() -> None:
-    # With 10 of 16 seeds some unit is barely active. Its weights have hardly a gradient, AdamW
+    # With 11 of 16 seeds some unit is barely active. Its weights have hardly a gradient, AdamW
     # scales that up to a whole step, and one sample beyond the corner makes the difference.
     *_, (agent, twin) = learn_both(9, 500)
     different = gaps(agent, twin) > 1e-4
