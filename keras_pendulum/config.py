@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-import numbers
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import ConfigError
-
-
-def _setting(
-    default: Any,
-    meaning: str,
-    *,
-    low: float | None = None,
-    high: float | None = None,
-    choices: tuple[str, ...] | None = None,
-) -> Any:
-    return field(
-        default=default,
-        metadata={"meaning": meaning, "low": low, "high": high, "choices": choices},
-    )
+from keras_pendulum.setting import checked, setting
 
 
 @dataclass(frozen=True)
@@ -32,151 +17,151 @@ class Config:
     Raises ConfigError, naming the field, for a value outside its range.
     """
 
-    preset: str = _setting("reference", "name of the preset these settings started from")
-    environment: str = _setting("Pendulum-v1", "Gymnasium's name", choices=tuple(TASKS))
-    gravity: float | None = _setting(
+    preset: str = setting("reference", "name of the preset these settings started from")
+    environment: str = setting("Pendulum-v1", "Gymnasium's name", choices=tuple(TASKS))
+    gravity: float | None = setting(
         1.0,
         "the pendulum's gravity in m/s² (Gymnasium's own default is 10; the original uses 1)",
         low=0,
         high=100,
     )
-    episodes: int = _setting(500, "episodes (original: 500)", low=1, high=1_000_000)
-    episode_steps: int = _setting(
+    episodes: int = setting(500, "episodes (original: 500)", low=1, high=1_000_000)
+    episode_steps: int = setting(
         200,
         "most steps of a training episode (original: 200; CartPole: 500); evaluation makes as many "
         "as Gymnasium does",
         low=1,
         high=10_000,
     )
-    seed: int = _setting(0, "seed of every random draw of the run", low=0, high=2**32 - 1)
-    hidden_units: tuple[int, ...] = _setting(
+    seed: int = setting(0, "seed of every random draw of the run", low=0, high=2**32 - 1)
+    hidden_units: tuple[int, ...] = setting(
         (512, 256, 128), "widths of the hidden layers, comma-separated (original)", low=1, high=8192
     )
-    activation: str = _setting(
+    activation: str = setting(
         "tanh",
         "of the hidden layers: tanh (original), or relu (notebooks)",
         choices=("tanh", "relu"),
     )
-    initial_weights: str = _setting(
+    initial_weights: str = setting(
         "glorot",
         "glorot: uniform, by inputs and outputs, biases 0 (Keras, original), or fan-in: uniform "
         "within ±1/√inputs, biases too (PyTorch, notebooks)",
         choices=("glorot", "fan-in"),
     )
-    torque_count: int = _setting(
+    torque_count: int = setting(
         41,
         "the pendulum's torques, evenly spaced from -2 to 2 N·m (original: linspace)",
         low=2,
         high=1001,
     )
-    replay_capacity: int = _setting(
+    replay_capacity: int = setting(
         25_000, "transitions remembered (original: 8000)", low=1, high=10_000_000
     )
-    batch_size: int = _setting(
+    batch_size: int = setting(
         32, "transitions in an update, drawn without replacement (original: 32)", low=1, high=65_536
     )
-    discount: float = _setting(0.9, "discount γ a step (original: 0.9)", low=0, high=1)
-    reward_scale: float = _setting(
+    discount: float = setting(0.9, "discount γ a step (original: 0.9)", low=0, high=1)
+    reward_scale: float = setting(
         1.0, "factor on the rewards that are learned from (original: 1)", low=1e-6, high=1e6
     )
-    bootstrap: str = _setting(
+    bootstrap: str = setting(
         "max",
         "how what follows is valued: max, the target network's highest value (original), or "
         "double, its value of the online network's choice (van Hasselt et al. 2016)",
         choices=("max", "double"),
     )
-    loss: str = _setting(
+    loss: str = setting(
         "squared",
         "squared: mean over all outputs (original), or huber: mean over the actions taken, δ = 1 "
         "(notebooks)",
         choices=("squared", "huber"),
     )
-    epsilon_schedule: str = _setting(
+    epsilon_schedule: str = setting(
         "episodes",
         "how ε, the share of random actions, falls: by a factor before each episode (original), or "
         "exponentially with the steps made (notebooks)",
         choices=("episodes", "steps"),
     )
-    epsilon_start: float = _setting(0.9, "ε before the first decay (original: 0.9)", low=0, high=1)
-    epsilon_decay: float = _setting(
+    epsilon_start: float = setting(0.9, "ε before the first decay (original: 0.9)", low=0, high=1)
+    epsilon_decay: float = setting(
         0.99, "episodes: factor on ε before each episode (original: 0.99)", low=0, high=1
     )
-    epsilon_decay_steps: float = _setting(
+    epsilon_decay_steps: float = setting(
         1000.0, "steps: ε - epsilon_min falls by e in so many (notebooks: 1000)", low=1, high=1e9
     )
-    epsilon_min: float = _setting(0.01, "ε never falls below this (original: 0.01)", low=0, high=1)
-    update_after: str = _setting(
+    epsilon_min: float = setting(0.01, "ε never falls below this (original: 0.01)", low=0, high=1)
+    update_after: str = setting(
         "episode",
         "when updates come: after each episode (original), or one after each step from the first "
         "full batch on (notebooks)",
         choices=("episode", "step"),
     )
-    learning_starts: int = _setting(
+    learning_starts: int = setting(
         40,
         "update_after episode: for those with a higher number than this (original: 40)",
         low=0,
         high=1_000_000,
     )
-    updates_per_episode: int = _setting(
+    updates_per_episode: int = setting(
         22,
         "update_after episode: gradient updates (original: 1, `update-starvation`)",
         low=1,
         high=10_000,
     )
-    optimizer: str = _setting(
+    optimizer: str = setting(
         "adam",
         "adam (Kingma & Ba 2015, original), or adamw with AMSGrad (Loshchilov & Hutter 2019, Reddi "
         "et al. 2018, notebooks)",
         choices=("adam", "adamw"),
     )
-    optimizer_epsilon: float = _setting(
+    optimizer_epsilon: float = setting(
         1e-7, "what keeps Adam from dividing by 0 (Keras: 1e-7; PyTorch: 1e-8)", low=0, high=1
     )
-    weight_decay: float = _setting(
+    weight_decay: float = setting(
         0.0,
         "adamw: share of each weight taken off, times the step size (notebooks: 0.01)",
         low=0,
         high=1,
     )
-    gradient_clip: float | None = _setting(
+    gradient_clip: float | None = setting(
         None,
         "each gradient value is cut to ± this (original: not cut; notebooks: 100)",
         low=1e-9,
         high=1e9,
     )
-    learning_rate: float = _setting(
+    learning_rate: float = setting(
         1e-3, "Adam's first step size (original: 1e-3)", low=1e-9, high=10
     )
-    learning_rate_schedule: str = _setting(
+    learning_rate_schedule: str = setting(
         "cosine",
         "constant (original), or a cosine from the first step size to 0 at the last update",
         choices=("constant", "cosine"),
     )
-    target_update: str = _setting(
+    target_update: str = setting(
         "soft",
         "how the target network follows: soft (Lillicrap et al. 2016), hard (Mnih et al. 2015), "
         "or none (original, `no-target-network`: the online network is its own target)",
         choices=("soft", "hard", "none"),
     )
-    target_blend: float = _setting(
+    target_blend: float = setting(
         0.1,
         "soft: share of the online weights blended in after each update (tried out; no original)",
         low=0,
         high=1,
     )
-    target_period: int = _setting(
+    target_period: int = setting(
         200,
         "hard: updates from one copy to the next (a usual value; no original)",
         low=1,
         high=1_000_000,
     )
-    remembered_action: str = _setting(
+    remembered_action: str = setting(
         "index",
         "what the replay buffer keeps: the index, or the index got back from the torque by "
         "truncation (walkthrough, `index-truncation`)",
         choices=("index", "truncated"),
     )
-    save_every: int = _setting(
+    save_every: int = setting(
         10, "episodes from one checkpoint to the next (walkthrough: 10)", low=1, high=1_000_000
     )
 
@@ -232,32 +217,4 @@ def checked_setting(name: str, value: Any) -> Any:
 
     Raises ConfigError for a value of another kind or outside the field's range.
     """
-    spec = Config.__dataclass_fields__[name]
-    rule = spec.metadata
-    kind, _, optional = str(spec.type).partition(" | ")
-    if value is None and optional:
-        return None
-    if kind == "str":
-        if not isinstance(value, str):
-            raise ConfigError(f"{name} is {value!r}; expected a name")
-        if rule["choices"] is not None and value not in rule["choices"]:
-            raise ConfigError(f"{name} is {value!r}; expected one of {', '.join(rule['choices'])}")
-        return value
-    if kind == "tuple[int, ...]":
-        if not isinstance(value, Sequence) or not 1 <= len(value) <= 16:
-            raise ConfigError(f"{name} is {value!r}; expected 1 to 16 whole numbers")
-        return tuple(_checked_number(name, int, number, rule) for number in value)
-    return _checked_number(name, float if kind == "float" else int, value, rule)
-
-
-def _checked_number(name: str, kind: type, value: Any, rule: Any) -> Any:
-    wanted = numbers.Real if kind is float else numbers.Integral
-    if isinstance(value, bool) or not isinstance(value, wanted):
-        word = "a number" if kind is float else "a whole number"
-        raise ConfigError(f"{name} is {value!r}; expected {word}")
-    number = kind(value)
-    if not rule["low"] <= number <= rule["high"]:  # written so that NaN fails too
-        raise ConfigError(
-            f"{name} is {number}; expected a number from {rule['low']} to {rule['high']}"
-        )
-    return number
+    return checked(Config.__dataclass_fields__[name], value)

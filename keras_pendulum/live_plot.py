@@ -11,7 +11,7 @@ from keras_pendulum.display import require_display
 if TYPE_CHECKING:
     from keras_pendulum.episodes import EpisodeRecord
 
-_SECONDS_BETWEEN = 0.5  # drawing takes about a tenth of that
+_SECONDS_BETWEEN = 0.5  # drawing takes time from learning
 
 
 class _Canvas(Protocol):
@@ -50,7 +50,7 @@ class LivePlot:
     def _draw(self) -> None:
         from keras_pendulum import pictures
 
-        self._canvas.show(pictures.returns(self._returns))
+        self._canvas.show(pictures.live_curve(self._returns))
         self._drawn = time.monotonic()
 
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from keras_pendulum.environment import TASKS
 from keras_pendulum.episodes import EpisodeRecord
 
-_MEAN_OVER = 10  # episodes
 _LEVEL_LINES = (("black", "--"), ("#D55E00", ":"))
 
 
@@ -29,56 +28,48 @@ def learning_curve(
     Returns:
         A PNG file's bytes.
     """
-    from matplotlib.figure import Figure
-
-    episodes = np.array([record.episode for record in history])
     task = TASKS[environment]
     if task.never_terminates:
-        label, unit = "Average reward per step", task.steps_per_episode
-        rewards = np.array([record.average_reward for record in history])
-    else:  # where each step earns 1, the return is what differs
-        label, unit = "Return (steps)", 1
-        rewards = np.array([record.episode_return for record in history])
-    figure = Figure(figsize=(8, 4.5), layout="constrained")
-    axes = figure.subplots()
-    axes.plot(episodes, rewards, ".", color="0.65", markersize=4, label="episode")
-    if len(rewards) >= _MEAN_OVER:
-        mean = np.convolve(rewards, np.ones(_MEAN_OVER) / _MEAN_OVER, "valid")
-        name = f"mean of {_MEAN_OVER} episodes"
-        axes.plot(episodes[_MEAN_OVER - 1 :], mean, color="#0072B2", linewidth=2, label=name)
-    for (name, level), (color, style) in zip(returns.items(), _LEVEL_LINES, strict=False):
-        axes.axhline(level / unit, color=color, linestyle=style, label=name)
-    axes.set_xlabel("Episode")
-    axes.set_ylabel(label)
-    axes.legend(loc="best")
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=120)
-    return stream.getvalue()
+        rewards = [record.average_reward for record in history]
+        levels = {name: level / task.steps_per_episode for name, level in returns.items()}
+        return _curve(rewards, "Average reward per step", mean_over=10, levels=levels)
+    # Where each step earns 1, the return is what differs.
+    steps = [record.episode_return for record in history]
+    return _curve(steps, "Return (steps)", mean_over=10, levels=returns)
 
 
-def returns(history: Sequence[float]) -> bytes:
+def live_curve(returns: Sequence[float]) -> bytes:
     """The notebooks' live plot: the return of each episode, with its mean over 100.
 
     Args:
-        history: the returns so far, at least one.
+        returns: of the episodes so far, at least one.
 
     Returns:
         A PNG file's bytes.
     """
+    return _curve(returns, "Return", mean_over=100, levels={})
+
+
+def _curve(
+    values: Sequence[float], label: str, *, mean_over: int, levels: Mapping[str, float]
+) -> bytes:
+    """A value for each episode from 0 on, with its running mean and level lines: a PNG."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7, 4), layout="constrained")
+    figure = Figure(figsize=(8, 4.5), layout="constrained")
     axes = figure.subplots()
-    axes.plot(history, ".", color="0.65", markersize=4, label="episode")
-    if len(history) >= 100:
-        mean = np.convolve(history, np.ones(100) / 100, "valid")
-        label = "mean of 100 episodes"
-        axes.plot(range(99, len(history)), mean, color="#0072B2", linewidth=2, label=label)
+    axes.plot(values, ".", color="0.65", markersize=4, label="episode")
+    if len(values) >= mean_over:
+        mean = np.convolve(values, np.ones(mean_over) / mean_over, "valid")
+        name = f"mean of {mean_over} episodes"
+        axes.plot(range(mean_over - 1, len(values)), mean, color="#0072B2", linewidth=2, label=name)
+    for (name, level), (color, style) in zip(levels.items(), _LEVEL_LINES, strict=False):
+        axes.axhline(level, color=color, linestyle=style, label=name)
     axes.set_xlabel("Episode")
-    axes.set_ylabel("Return")
-    axes.legend(loc="best")
+    axes.set_ylabel(label)
+    axes.legend(loc="lower right")
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=100)
+    figure.savefig(stream, format="png", dpi=120)
     return stream.getvalue()
 
 

@@ -28,12 +28,14 @@ class RunFolder:
 
     def __init__(self, path: str | os.PathLike[str], environment: str | None = None) -> None:
         self.path = Path(path)
-        self._checkpoints = [self.path / task.weights_name for task in TASKS.values()]
+        checkpoints = [self.path / task.weights_name for task in TASKS.values()]
         if environment is not None:
             self.weights = self.path / TASKS[environment].weights_name
         else:
-            there = [file for file in self._checkpoints if file.exists()]
-            self.weights = there[0] if there else self._checkpoints[0]
+            there = [file for file in checkpoints if file.exists()]
+            # Two lie there where one run was replacing another and was killed: the newer goes on.
+            self.weights = max(there, key=lambda file: file.stat().st_mtime, default=checkpoints[0])
+        self._others = [file for file in checkpoints if file != self.weights]
         self.history = self.path / "history.csv"
         self.config = self.path / "config.json"
         self.picture = self.path / "rewards.png"
@@ -53,28 +55,24 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
-        others = [file for file in self._checkpoints if file != self.weights]
-        used = [file.name for file in (*self.files, *others) if file.exists()]
+        used = [file.name for file in (*self.files, *self._others) if file.exists()]
         if used and not overwrite:
             raise UserError(
                 f"{self.path} already holds a run ({', '.join(used)}): go on with it by --resume, "
                 "replace it by --overwrite, or name another folder by --out"
             )
-        for file in others:  # no policy of the replaced run stays beside the new one's
-            try:
-                file.unlink(missing_ok=True)
-            except OSError as error:
-                raise UserError(f"cannot replace {file}: {error.strerror}") from error
 
     def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
         """Writes the settings, and the history of the episodes before a resumed run goes on.
 
-        A picture of what was here before goes. Raises UserError when the folder cannot be written.
+        To be called once the run's own checkpoint is there: a picture and another environment's
+        policy that were here before go. Raises UserError when the folder cannot be written.
         """
-        try:
-            self.picture.unlink(missing_ok=True)
-        except OSError as error:
-            raise UserError(f"cannot replace {self.picture}: {error.strerror}") from error
+        for file in (self.picture, *self._others):
+            try:
+                file.unlink(missing_ok=True)
+            except OSError as error:
+                raise UserError(f"cannot replace {file}: {error.strerror}") from error
         write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
         lines = [",".join(_COLUMNS), *map(_row, history)]
         write_atomically(self.history, "".join(line + "\n" for line in lines).encode())

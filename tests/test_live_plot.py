@@ -31,7 +31,7 @@ def test_the_window_shows_the_curve_and_what_is_added_to_it(window: live_plot.Li
     window(record(0))
     window(record(1))
     before = shown()
-    assert before.shape == (700, 400, 3)
+    assert before.shape == (960, 540, 3)
     assert len(np.unique(before.reshape(-1, 3), axis=0)) > 10  # not an empty window
     window(record(2))
     assert (shown() != before).any()

@@ -18,6 +18,7 @@ from conftest import command_line
 import keras_pendulum as kp
 from keras_pendulum.checkpoint import load_checkpoint, load_config, save_checkpoint
 from keras_pendulum.run import Run
+from keras_pendulum.run_folder import RunFolder
 
 SHORT: dict[str, Any] = {"episodes": 46}  # learning begins at episode 41
 
@@ -120,6 +121,38 @@ def test_a_used_folder_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
     assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
     kp.train_dqn(kp.preset("original", episodes=3, hidden_units=(8,)), tmp_path, overwrite=True)
     assert len((tmp_path / "history.csv").read_text().splitlines()) == 4
+
+
+def test_a_run_of_another_environment_is_replaced_only_when_the_new_one_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pendulum = kp.preset("original", episodes=2, hidden_units=(8,))
+    cartpole = kp.preset("cartpole-original", episodes=2)
+    kp.train_dqn(pendulum, tmp_path)
+    with pytest.raises(kp.UserError, match=r"already holds a run .*pendulum_weight\.h5"):
+        kp.train_dqn(cartpole, tmp_path)
+    policy = (tmp_path / "pendulum_weight.h5").read_bytes()
+    with monkeypatch.context() as patched:
+        patched.setattr("keras_pendulum.atomic_file.os.fsync", full_disk)
+        with pytest.raises(kp.UserError, match="cannot write"):
+            kp.train_dqn(cartpole, tmp_path, overwrite=True)
+    assert (tmp_path / "pendulum_weight.h5").read_bytes() == policy
+    kp.train_dqn(cartpole, tmp_path, overwrite=True)
+    assert not (tmp_path / "pendulum_weight.h5").exists()
+    assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
+
+
+def full_disk(descriptor: int) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_of_two_checkpoints_the_newer_one_goes_on(tmp_path: Path) -> None:
+    for name, age in (("pendulum_weight.h5", 10), ("cartpole_weight.h5", 20)):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (age, age))
+    assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
+    os.utime(tmp_path / "pendulum_weight.h5", (30, 30))
+    assert RunFolder(tmp_path).weights.name == "pendulum_weight.h5"
 
 
 @pytest.mark.parametrize("name", ["original", "walkthrough", "reference", "cartpole-original"])
