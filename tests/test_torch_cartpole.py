@@ -125,8 +125,8 @@ def test_the_initial_weights_are_spread_like_torchs() -> None:
 def test_huber_is_torchs_and_the_sum_done_by_hand() -> None:
     q = np.array([[0.5, 9], [9, 3.0], [9, -2]], np.float32)
     action = np.array([0, 1, 1], np.int32)
-    target = np.array([0, 0, -1.5], np.float32)
-    by_hand = (0.5 * 0.5**2 + (3 - 0.5) + 0.5 * 0.5**2) / 3
+    target = np.array([0, 0, -3.5], np.float32)
+    by_hand = (0.5 * 0.5**2 + (3 - 0.5) + (1.5 - 0.5)) / 3
     assert float(huber(q, action, target)) == pytest.approx(by_hand)
     taken = torch.tensor([0.5, 3, -2])
     theirs = torch.nn.functional.smooth_l1_loss(taken, torch.from_numpy(target))
