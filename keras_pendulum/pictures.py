@@ -67,7 +67,7 @@ def _curve(
         axes.axhline(level, color=color, linestyle=style, label=name)
     axes.set_xlabel("Episode")
     axes.set_ylabel(label)
-    axes.legend(loc="lower right")
+    figure.legend(loc="outside upper center", ncols=4)  # where it covers no episode
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=120)
     return stream.getvalue()
