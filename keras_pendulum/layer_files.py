@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from keras_pendulum import integrity
 from keras_pendulum.errors import UserError, WeightsError
 
 _LARGEST_FILE = 2**30  # bytes; a checkpoint of `reference` has 4.5 MB
@@ -41,6 +42,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
             raise WeightsError(f"{path}: not a file; expected a weights file (.h5)")
         with open(file, "rb") as stream:
             head = stream.read(8)
+            integrity.verify(stream, path)
     except OSError as error:
         raise WeightsError(f"{path}: cannot be read ({error.strerror})") from error
     try:

@@ -15,7 +15,7 @@ from typing import Any
 import h5py
 from numpy.typing import NDArray
 
-from keras_pendulum import __version__, layer_files
+from keras_pendulum import __version__, integrity, layer_files
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.config import checked_setting
 from keras_pendulum.environment import TASKS
@@ -68,7 +68,7 @@ def weights_file(
                 group.create_dataset(key, data=array)
         file.flush()
         image: bytes = file.id.get_file_image()
-    return image
+    return integrity.sealed(image)
 
 
 def load_weights(path: str | os.PathLike[str]) -> DQN:
