@@ -41,7 +41,7 @@ def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
         target=_numbered(agent["target"]),
         optimizer=_numbered(agent["optimizer"]),
         replay=run.replay.get_state(),
-        # JSON as bytes: HDF5's own strings are pointers into a heap that no reader can bound.
+        # JSON as an array: an attribute can hold no more than 64 KB.
         run={"state": np.frombuffer(json.dumps(state).encode(), np.uint8), "history": history},
     )
     write_atomically(path, content)

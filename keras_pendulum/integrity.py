@@ -24,20 +24,34 @@ def sealed(image: bytes) -> bytes:
 def verify(file: BinaryIO, path: str | os.PathLike[str]) -> None:
     """Raises WeightsError when the bytes of a sealed file are not those that were sealed.
 
-    A file without a seal, as Keras writes them, passes.
+    A file without anything behind its content, as Keras writes them, passes.
     """
-    size = file.seek(0, os.SEEK_END) - _SEAL
-    file.seek(max(0, size))
-    seal = file.read()
-    if not seal.startswith(_MARK):
+    head = file.read(64)
+    size = file.seek(0, os.SEEK_END)
+    end = _end_of_content(head)
+    if end is None or size <= end:
         return
+    content = max(0, size - _SEAL)
+    file.seek(content)
+    seal = file.read()
     file.seek(0)
     sha256 = hashlib.sha256()
-    while size > 0 and (part := file.read(min(size, 2**20))):
+    while content > 0 and (part := file.read(min(content, 2**20))):
         sha256.update(part)
-        size -= len(part)
-    if sha256.hexdigest().encode() != seal[len(_MARK) :]:
+        content -= len(part)
+    if seal != _MARK + sha256.hexdigest().encode():
         raise WeightsError(
             f"{path}: the file is damaged, or was changed by another program (its SHA-256 is not "
             "the one recorded)"
         )
+
+
+def _end_of_content(head: bytes) -> int | None:
+    """Where HDF5 says in a file's first 64 bytes that its content ends; None if it says nothing.
+
+    HDF5 File Format Specification, "Superblock": the versions keep it in different places.
+    """
+    place = {0: 40, 1: 44, 2: 28, 3: 28}.get(head[8]) if len(head) == 64 else None
+    if place is None or not head.startswith(b"\x89HDF"):
+        return None
+    return int.from_bytes(head[place : place + 8], "little")

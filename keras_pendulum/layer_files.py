@@ -1,8 +1,9 @@
 """The layers of a feed-forward network inside an HDF5 file: found, checked, read, written.
 
-Keras loads a wrong file half-way, or silently wrong. Here every array is checked before it is
-read: float, of a believable size, stored plainly in the file itself, finite, and in a chain in
-which each layer takes what the one before gives.
+Keras loads a wrong file half-way, or silently wrong. Here a file is opened only when its digest is
+right (`integrity`) and it holds nothing but plain arrays (`structure`), and its layers are taken
+only when they are float, of a believable size, finite, and a chain in which each takes what the
+one before gives.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum import integrity
+from keras_pendulum import integrity, structure
 from keras_pendulum.errors import UserError, WeightsError
 
 _LARGEST_FILE = 2**30  # bytes; a checkpoint of `reference` has 4.5 MB
@@ -31,8 +32,9 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
     """The HDF5 file at `path`, open for reading.
 
     Raises:
-        WeightsError: missing, a folder, empty, not HDF5, truncated or otherwise damaged, also
-            where the damage shows only inside the `with` block.
+        WeightsError: missing, a folder, empty, not HDF5, of a structure no network needs,
+            truncated or otherwise damaged, also where the damage shows only inside the `with`
+            block.
     """
     file = Path(path)
     try:
@@ -41,8 +43,9 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
         if not file.is_file():
             raise WeightsError(f"{path}: not a file; expected a weights file (.h5)")
         with open(file, "rb") as stream:
-            head = stream.read(8)
             integrity.verify(stream, path)
+            stream.seek(0)
+            head = stream.read(8)
     except OSError as error:
         raise WeightsError(f"{path}: cannot be read ({error.strerror})") from error
     try:
@@ -53,6 +56,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
         if file.stat().st_size > _LARGEST_FILE:
             raise WeightsError(f"{path}: larger than 1 GiB; no network here is")
         with h5py.File(file, "r") as content:
+            structure.check(content, path)
             yield content
     except UserError:
         raise
@@ -109,25 +113,13 @@ def read_layers(
 
 
 def read_array(dataset: Any, path: str | os.PathLike[str], *, finite: bool = True) -> NDArray[Any]:
-    """The numbers of a dataset, checked before and (where they must be `finite`) after reading.
+    """The numbers of a dataset in a file that `opened` has let through.
 
     Raises:
-        WeightsError: not numbers, not stored plainly in this file, or not finite.
+        WeightsError: it is a group, or holds a NaN or infinity where all must be `finite`.
     """
     if not isinstance(dataset, h5py.Dataset):
         raise WeightsError(f"{path}: {dataset.name} is not an array")
-    plain = (
-        dataset.chunks is None
-        and not dataset.external
-        and not dataset.is_virtual
-        and dataset.dtype.kind in "fiub"
-        and dataset.id.get_storage_size() == dataset.nbytes
-    )
-    if not plain:
-        raise WeightsError(
-            f"{path}: {dataset.name} ({dataset.dtype}, {dataset.shape}) is not a plain array of "
-            "numbers stored whole in this file"
-        )
     array: NDArray[Any] = dataset[()]
     with np.errstate(over="ignore"):  # what float32 cannot hold is infinite to a network
         if finite and not np.isfinite(array.astype(np.float32)).all():
@@ -138,8 +130,8 @@ def read_array(dataset: Any, path: str | os.PathLike[str], *, finite: bool = Tru
 def write_layers(file: h5py.File, arrays: list[NDArray[np.float32]]) -> None:
     """Writes kernel, bias, kernel, bias, … in the layout of Keras 2's `save_weights`."""
     names = ["dense" if i == 0 else f"dense_{i}" for i in range(len(arrays) // 2)]
-    file.attrs["backend"] = b"tensorflow"
-    file.attrs["keras_version"] = b"2.15.0"  # the version whose layout this is
+    file.attrs["backend"] = np.bytes_("tensorflow")
+    file.attrs["keras_version"] = np.bytes_("2.15.0")  # the version whose layout this is
     file.attrs["layer_names"] = np.array(names, "S")
     for name, kernel, bias in zip(names, arrays[::2], arrays[1::2], strict=True):
         group = file.create_group(name)
@@ -153,9 +145,9 @@ def write_layers(file: h5py.File, arrays: list[NDArray[np.float32]]) -> None:
 def _keras2_layers(root: h5py.Group) -> list[_Layer]:
     """Layers with weights, in the file's own order."""
     layers = []
-    for name in map(_text, root.attrs["layer_names"]):
+    for name in map(text, root.attrs["layer_names"]):
         group = root[name]
-        datasets = [group[_text(part)] for part in group.attrs["weight_names"]]
+        datasets = [group[text(part)] for part in group.attrs["weight_names"]]
         if datasets:  # Flatten, Dropout and the like have none
             layers.append((name, datasets))
     return layers
@@ -169,7 +161,7 @@ def _keras3_layers(root: h5py.Group, inputs: int) -> list[_Layer]:
         *parents, last = path.split("/")
         if last == "vars" and parents[:1] != ["optimizer"] and len(entry):
             # The layer's own name, dense_3, counts the layers as they were made.
-            name = _text(entry.attrs.get("name", "/".join(parents)))
+            name = text(entry.attrs.get("name", "/".join(parents)))
             layers[path] = (name, [entry[key] for key in sorted(entry, key=_natural)])
 
     root.visititems(collect)
@@ -199,5 +191,6 @@ def _natural(name: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
-def _text(name: Any) -> str:
+def text(name: Any) -> str:
+    """An HDF5 text as Python's, however it is stored."""
     return name.decode() if isinstance(name, bytes) else str(name)

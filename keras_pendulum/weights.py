@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum import __version__, integrity, layer_files
@@ -53,15 +54,20 @@ def weights_file(
     # In memory, in blocks that a whole checkpoint fits in; nothing is written to the disk.
     with h5py.File("weights", "w", driver="core", backing_store=False, block_size=2**23) as file:
         layer_files.write_layers(file, network.get_weights())
-        about = file.create_group(_ORIGIN).attrs
-        about["version"] = __version__
-        about["versions"] = json.dumps(_versions())
-        about["activation"] = network.activation
-        about["environment"] = network.origin.environment
-        known = {name: getattr(network.origin, name) for name in _OPTIONAL}
-        for name, value in {**known, "evaluated_return": evaluated_return}.items():
+        about = {
+            "version": __version__,
+            "versions": json.dumps(_versions()),
+            "activation": network.activation,
+            "environment": network.origin.environment,
+            **{name: getattr(network.origin, name) for name in _OPTIONAL},
+            "evaluated_return": evaluated_return,
+        }
+        attributes = file.create_group(_ORIGIN).attrs
+        for name, value in about.items():
             if value is not None:
-                about[name] = value
+                # Of fixed length: HDF5's other texts are pointers into a heap that no reader can
+                # bound.
+                attributes[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
         for name, arrays in groups.items():
             group = file.create_group(name)
             for key, array in arrays.items():
@@ -105,7 +111,10 @@ def load_weights(path: str | os.PathLike[str]) -> DQN:
 
 
 def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Origin]:
-    about = file[_ORIGIN].attrs if _ORIGIN in file else {}
+    about = {
+        name: layer_files.text(value) if isinstance(value, bytes | str) else value
+        for name, value in (file[_ORIGIN].attrs.items() if _ORIGIN in file else ())
+    }
     activation = about.get("activation", "tanh")
     if activation not in ACTIVATIONS:
         raise WeightsError(
@@ -123,9 +132,9 @@ def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Or
     return activation, Origin(
         environment=environment,
         gravity=gravity,
-        preset=str(about["preset"]) if "preset" in about else None,
+        preset=about.get("preset"),
         seed=int(about["seed"]) if "seed" in about else None,
-        config=str(about["config"]) if "config" in about else None,
+        config=about.get("config"),
     )
 
 
@@ -133,7 +142,6 @@ def _versions() -> dict[str, str]:
     """Of what made the numbers in the file."""
     import gymnasium
     import keras
-    import numpy as np
     import tensorflow as tf
 
     return {

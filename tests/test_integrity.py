@@ -60,18 +60,35 @@ def test_no_zeroed_block_gets_in(size: int, checkpoint: bytes, tmp_path: Path) -
 
 def test_no_shortened_file_gets_in(checkpoint: bytes, tmp_path: Path) -> None:
     whole = checkpoint.rindex(b"\nkeras_pendulum sha256")  # only the digest is behind it
-    lengths = {0, 1, 7, 8, 9, 100, 511, 512, 2048, whole // 2, whole - 4096, whole - 8, whole - 1}
+    lengths = {
+        len(checkpoint) - 1,
+        whole + 1,
+        0,
+        1,
+        7,
+        8,
+        9,
+        100,
+        511,
+        512,
+        2048,
+        whole // 2,
+        whole - 4096,
+        whole - 8,
+        whole - 1,
+    }
     for length in sorted(lengths | set(range(0, whole, 4999))):
         assert refused(kp.load_weights, tmp_path / "short.h5", checkpoint[:length]), length
 
 
-def test_a_file_whose_digest_was_cut_off_is_still_whole(checkpoint: bytes, tmp_path: Path) -> None:
-    whole = checkpoint.rindex(b"\nkeras_pendulum sha256")
-    for length in (whole, whole + 10, len(checkpoint) - 1):
-        assert not refused(resume, tmp_path / "whole.h5", checkpoint[:length])
-
-
-def test_a_file_with_something_behind_its_digest_is_still_whole(
+def test_a_file_with_half_a_digest_or_more_than_one_is_refused(
     checkpoint: bytes, tmp_path: Path
 ) -> None:
-    assert not refused(resume, tmp_path / "longer.h5", checkpoint + b"\n")
+    whole = checkpoint.rindex(b"\nkeras_pendulum sha256")
+    for content in (checkpoint[:-1], checkpoint[: whole + 1], checkpoint + b"\n"):
+        assert refused(kp.load_weights, tmp_path / "tail.h5", content)
+
+
+def test_a_file_without_a_digest_loads_as_keras_own_do(checkpoint: bytes, tmp_path: Path) -> None:
+    whole = checkpoint.rindex(b"\nkeras_pendulum sha256")
+    assert not refused(resume, tmp_path / "plain.h5", checkpoint[:whole])

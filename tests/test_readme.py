@@ -14,6 +14,7 @@ import pytest
 
 import keras_pendulum as kp
 from benchmarks.departures import BEFORE, departures, measured
+from keras_pendulum.layer_files import text
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -106,7 +107,10 @@ def test_pictures_and_named_modules_exist() -> None:
 def test_a_shipped_policy_repeats_the_return_that_its_file_states(name: str) -> None:
     path = kp.find_weights(name)
     with h5py.File(path) as file:
-        stated = dict(file["keras_pendulum"].attrs)
+        attributes = file["keras_pendulum"].attrs.items()
+        stated = {
+            key: text(value) if isinstance(value, bytes) else value for key, value in attributes
+        }
     network = kp.load_weights(path)
     assert stated["preset"] == json.loads(stated["config"])["preset"] == name
     assert stated["seed"] == json.loads(stated["config"])["seed"]

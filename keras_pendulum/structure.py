@@ -1,0 +1,96 @@
+"""What an HDF5 file may consist of here: a small tree of plain arrays.
+
+HDF5 can do much more: point into other files, at itself, or at less than it declares. All of that
+is refused before a single array is read, so that a stranger's file costs neither time nor memory.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from keras_pendulum.errors import WeightsError
+
+_MOST_ENTRIES = 2000  # groups and arrays; a checkpoint has about 60
+_DEEPEST = 10  # groups inside groups; Keras 3 goes down to 4
+_MOST_ATTRIBUTES = 64  # of one group or array
+_LARGEST_ATTRIBUTE = 2**16  # bytes, HDF5's own limit where attributes lie in an object's header
+# A text of variable length lies in a heap that cannot be measured without reading it.
+_LARGEST_FILE_WITH_TEXTS = 2**26  # bytes
+
+
+def check(file: h5py.File, path: str | os.PathLike[str]) -> None:
+    """Raises WeightsError for anything but groups, plain arrays and small attributes."""
+    size = Path(path).stat().st_size
+    stored = 0
+    for count, entry in enumerate(_entries(file, path)):
+        if count > _MOST_ENTRIES:
+            raise WeightsError(f"{path}: holds more than {_MOST_ENTRIES} groups and arrays")
+        _check_attributes(entry, size, path)
+        if isinstance(entry, h5py.Dataset):
+            _check_array(entry, path)
+            stored += _bytes_in(entry)
+            if stored > size:
+                raise WeightsError(
+                    f"{path}: its arrays up to {entry.name} declare {stored} bytes; the file has "
+                    f"{size}"
+                )
+        elif not isinstance(entry, h5py.Group):
+            raise WeightsError(f"{path}: {entry.name} is neither a group nor an array")
+
+
+def _entries(group: h5py.Group, path: str | os.PathLike[str], depth: int = 0) -> Iterator[Any]:
+    """The group and all below it, each as often as something leads to it."""
+    yield group
+    if depth > _DEEPEST:  # also where a group contains itself
+        raise WeightsError(f"{path}: {group.name} lies more than {_DEEPEST} groups deep")
+    if len(group) > _MOST_ENTRIES:
+        raise WeightsError(f"{path}: {group.name} holds {len(group)} entries")
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            raise WeightsError(f"{path}: {group.name} has a link, {name}, in place of an array")
+        entry = group[name]
+        if isinstance(entry, h5py.Group):
+            yield from _entries(entry, path, depth + 1)
+        else:
+            yield entry
+
+
+def _check_array(dataset: h5py.Dataset, path: str | os.PathLike[str]) -> None:
+    plain = (
+        dataset.dtype.kind in "fiub"
+        and dataset.chunks is None
+        and not dataset.external
+        and not dataset.is_virtual
+        and dataset.id.get_storage_size() == _bytes_in(dataset)
+    )
+    if not plain:
+        raise WeightsError(
+            f"{path}: {dataset.name} ({dataset.dtype}, {dataset.shape}) is not a plain array of "
+            "numbers stored whole in this file"
+        )
+
+
+def _bytes_in(dataset: h5py.Dataset) -> int:
+    # In Python's integers, because h5py's own product can overflow.
+    return math.prod(dataset.shape) * dataset.dtype.itemsize
+
+
+def _check_attributes(entry: Any, size: int, path: str | os.PathLike[str]) -> None:
+    if len(entry.attrs) > _MOST_ATTRIBUTES:
+        raise WeightsError(f"{path}: {entry.name} has {len(entry.attrs)} attributes")
+    for name in entry.attrs:
+        attribute = entry.attrs.get_id(name)
+        text = h5py.check_string_dtype(attribute.dtype)
+        variable = text is not None and text.length is None
+        if math.prod(attribute.shape) * attribute.dtype.itemsize > _LARGEST_ATTRIBUTE:
+            raise WeightsError(f"{path}: {entry.name} has a huge attribute, {name}")
+        if variable and size > _LARGEST_FILE_WITH_TEXTS:
+            raise WeightsError(f"{path}: {entry.name} has a text of no fixed length, {name}")
+        if not variable and attribute.dtype.kind not in "fiubS":
+            raise WeightsError(f"{path}: {entry.name} has an attribute {name} of no plain type")

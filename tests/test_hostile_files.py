@@ -1,0 +1,166 @@
+"""Files made to cost time or memory, or to reach into others: refused before any array is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.checkpoint import load_config
+
+KERNEL = {"keras 2": "dense/dense/kernel:0", "keras 3": "hidden/dense/vars/0"}
+Change = Callable[[h5py.File, str], None]
+
+
+def instead(make: Change) -> Change:
+    """What `make` puts in the place of a kernel."""
+
+    def change(file: h5py.File, kernel: str) -> None:
+        del file[kernel]
+        make(file, kernel)
+
+    return change
+
+
+def chunked(file: h5py.File, name: str) -> None:
+    """A gibibyte that is stored in a few kilobytes."""
+    file.create_dataset(name, (2**14, 2**14), "f4", chunks=(2**11, 2**11), compression="gzip")
+
+
+def texts(file: h5py.File, name: str) -> None:
+    file.create_dataset(name, data=["a"] * 4, dtype=h5py.string_dtype())
+
+
+def reference(file: h5py.File, name: str) -> None:
+    file.create_dataset(name, data=[file.ref] * 4, dtype=h5py.ref_dtype)
+
+
+def compound(file: h5py.File, name: str) -> None:
+    file.create_dataset(name, data=np.zeros(4, [("a", "f4"), ("b", "f4")]))
+
+
+def virtual(file: h5py.File, name: str) -> None:
+    layout = h5py.VirtualLayout((3, 16), np.float32)
+    layout[:] = h5py.VirtualSource("elsewhere.h5", "data", (3, 16))
+    file.create_virtual_dataset(name, layout)
+
+
+def external(file: h5py.File, name: str) -> None:
+    file.create_dataset(name, (3, 16), "f4", external=[("/etc/hostname", 0, 192)])
+
+
+def unwritten(file: h5py.File, name: str) -> None:
+    file.create_dataset(name, (2**14, 2**14), "f4")
+
+
+def same_array_again_and_again(file: h5py.File, kernel: str) -> None:
+    for i in range(1500):
+        file[f"again_{i}"] = file[kernel]
+
+
+def circle(file: h5py.File, kernel: str) -> None:
+    group = file.create_group("circle")
+    group["inside"] = group
+
+
+def deep(file: h5py.File, kernel: str) -> None:
+    file.create_group("/".join("deep" for _ in range(40)))
+
+
+def many_names(file: h5py.File, kernel: str) -> None:
+    for i in range(3000):
+        file[f"name_{i}"] = h5py.SoftLink("/nowhere")
+
+
+def many_in_groups(file: h5py.File, kernel: str) -> None:
+    for i in range(60):
+        group = file.create_group(f"group_{i}")
+        for k in range(60):
+            group.create_group(str(k))
+
+
+def many_attributes(file: h5py.File, kernel: str) -> None:
+    for i in range(100):
+        file.attrs[f"attribute_{i}"] = i
+
+
+def put(name: str, value: Any) -> Change:
+    return lambda file, kernel: file.__setitem__(name, value)
+
+
+HOSTILE: dict[str, tuple[Change, str]] = {
+    "soft link": (instead(lambda file, name: file.__setitem__(name, h5py.SoftLink("/"))), "a link"),
+    "external link": (
+        instead(lambda file, name: file.__setitem__(name, h5py.ExternalLink("other.h5", "/x"))),
+        "a link",
+    ),
+    "link anywhere": (put("aside", h5py.SoftLink("/nowhere")), "a link"),
+    "external storage": (instead(external), "not a plain array"),
+    "virtual": (instead(virtual), "not a plain array"),
+    "compressed bomb": (instead(chunked), "not a plain array"),
+    "declared but not stored": (instead(unwritten), "not a plain array"),
+    "texts": (instead(texts), "not a plain array"),
+    "references": (instead(reference), "not a plain array"),
+    "compound": (instead(compound), "not a plain array"),
+    "type in place of an array": (put("type", np.dtype("f4")), "neither a group nor an array"),
+    "arrays that share their bytes": (same_array_again_and_again, "declare"),
+    "circle": (circle, "groups deep"),
+    "deep": (deep, "groups deep"),
+    "many names": (many_names, "entries"),
+    "many groups in groups": (many_in_groups, "more than"),
+    "many attributes": (many_attributes, "attributes"),
+    "huge attribute": (
+        lambda file, kernel: file.create_group("new").attrs.create("huge", np.zeros(2**20)),
+        "huge attribute",
+    ),
+    "reference attribute": (
+        lambda file, kernel: file.attrs.create("ref", file.ref, dtype=h5py.ref_dtype),
+        "of no plain type",
+    ),
+}
+
+
+@pytest.mark.parametrize("layout", KERNEL)
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_it_is_refused_in_one_line_before_an_array_is_read(
+    kind: str, layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    change, message = HOSTILE[kind]
+    network = kp.DQN((16, 8), 5)
+    path = tmp_path / "hostile.h5"
+    if layout == "keras 2":
+        kp.save_weights(network, path)
+    else:
+        network.save_weights(tmp_path / "a.weights.h5")
+        (tmp_path / "a.weights.h5").rename(path)
+    assert kp.load_weights(path).hidden_units == (16, 8)
+    # The newest format is the one that lets attributes be huge.
+    with h5py.File(path, "r+", libver="latest") as file:
+        change(file, KERNEL[layout])
+
+    def read(*parts: object) -> None:
+        raise AssertionError("an array was read")
+
+    monkeypatch.setattr(h5py.Dataset, "__getitem__", read)
+    for load in (kp.load_weights, load_config):
+        with pytest.raises(kp.WeightsError) as caught:
+            load(path)
+        assert message in str(caught.value)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_large_file_with_texts_of_no_fixed_length_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kp.DQN((16, 8), 5).save_weights(tmp_path / "a.weights.h5")
+    monkeypatch.setattr("keras_pendulum.structure._LARGEST_FILE_WITH_TEXTS", 1000)
+    with pytest.raises(kp.WeightsError, match="no fixed length"):
+        kp.load_weights(tmp_path / "a.weights.h5")
+    kp.save_weights(kp.DQN((16, 8), 5), tmp_path / "ours.h5")
+    kp.load_weights(tmp_path / "ours.h5")
