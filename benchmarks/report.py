@@ -15,6 +15,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import keras_pendulum as kp
+from keras_pendulum.environment import TASKS
+
 RESULTS = Path(__file__).parent / "results"
 _PACKAGES = ("tensorflow-cpu", "tensorflow", "keras", "gymnasium", "numpy")
 
@@ -70,6 +73,16 @@ def machine() -> str:
         model = names[0].split(":")[1].strip() if names else model
     parts = [f"{os.cpu_count()} cores of {model}", f"Python {platform.python_version()}"]
     return ", ".join(parts + versions(_PACKAGES))
+
+
+def best_mean_return(score: kp.Score) -> float:
+    """The best possible mean return on a score's starts.
+
+    CartPole's is all that an episode can give, as soon as one policy reaches it.
+    """
+    if TASKS[score.environment].has_torque:
+        return score.optimal_mean_return
+    return float(TASKS[score.environment].steps_per_episode)
 
 
 def markdown(rows: Sequence[Row]) -> str:

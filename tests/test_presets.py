@@ -133,6 +133,12 @@ def test_cartpole_original_has_the_notebooks_numbers() -> None:
     assert (config.target_update, config.target_blend) == ("soft", 0.005)
 
 
+def test_cartpole_keeps_the_notebooks_network_and_optimizer() -> None:
+    ours, theirs = kp.preset("cartpole"), kp.preset("cartpole-original")
+    for name in ("environment", "hidden_units", "activation", "loss", "optimizer", "discount"):
+        assert getattr(ours, name) == getattr(theirs, name), name
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
