@@ -26,7 +26,8 @@ _MAY_CHANGE = {"episodes", "save_every"}
 def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
     """Writes the run as it stands between two episodes.
 
-    Raises UserError when the file cannot be written; an old checkpoint is then unharmed.
+    Raises UserError when the file cannot be written, or a weight is not finite; an old checkpoint
+    is then unharmed.
     """
     agent = run.agent.get_state()
     state = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from keras_pendulum.actions import Actions
 from keras_pendulum.agent import Agent
 from keras_pendulum.config import Config
+from keras_pendulum.errors import UserError
 from keras_pendulum.exploration import make_schedule
 from keras_pendulum.randomness import RandomSource
 from keras_pendulum.replay import ReplayBuffer
@@ -51,6 +53,9 @@ def learn_episodes(
 
     The environment is seeded before episode 0 only, as in the recorded run; afterwards its own
     generator goes on.
+
+    Raises UserError, with episode and step, when a reward, an observation or a loss is not finite:
+    nothing that follows could be trusted.
     """
     schedule = make_schedule(config)
     first = 0 if last is None else last.episode + 1
@@ -60,7 +65,14 @@ def learn_episodes(
         positions = [
             random.batch_positions(len(replay), config.batch_size) for _ in range(count)
         ]  # [K, B]
-        return agent.update(replay.at(positions), following).tolist()
+        losses: list[float] = agent.update(replay.at(positions), following).tolist()
+        wrong = [loss for loss in losses if not math.isfinite(loss)]
+        if wrong:
+            raise UserError(
+                f"episode {episode}, step {replay.added - before}: the loss is {wrong[0]}, "
+                "learning has diverged; try a smaller learning_rate"
+            )
+        return losses
 
     for episode in range(first, config.episodes):
         started = time.perf_counter()
@@ -74,6 +86,11 @@ def learn_episodes(
             action = agent.select_action(observation, epsilon)
             following, reward, terminated, truncated, _ = env.step(actions.control(action))
             reward = float(reward)
+            if not math.isfinite(reward + following.dot(following)):
+                raise UserError(
+                    f"episode {episode}, step {replay.added - before + 1}: the environment gave "
+                    f"the reward {reward} and the observation {following}"
+                )
             replay.add(
                 observation,
                 actions.remembered_index(action),

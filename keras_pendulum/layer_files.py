@@ -44,6 +44,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
             raise WeightsError(f"{path}: not a file; expected a weights file (.h5)")
         with open(file, "rb") as stream:
             integrity.verify(stream, path)
+            structure.check_heaps(stream, path)
             stream.seek(0)
             head = stream.read(8)
     except OSError as error:

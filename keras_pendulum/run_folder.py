@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -45,16 +47,40 @@ class RunFolder:
         """Every file that a run leaves here."""
         return [self.weights, self.history, self.config, self.picture]
 
-    def claim(self, overwrite: bool) -> None:
-        """Makes the folder ready for a new run.
-
-        Raises:
-            UserError: it holds a run already and `overwrite` is false, or it cannot be made.
-        """
+    def make(self) -> None:
+        """Makes the folder, if need be. Raises UserError when it cannot be made."""
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Keeps other runs out of the folder meanwhile; the system lets go of a killed run's.
+
+        Raises UserError when another run holds it.
+        """
+        if not self.path.is_dir():
+            yield  # nothing to resume, which the checkpoint's reader tells
+            return
+        descriptor = os.open(self.path, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            os.close(descriptor)
+            raise UserError(
+                f"another run is going on in {self.path}: wait for its end, or name another folder "
+                "by --out"
+            ) from error
+        except OSError:  # a file system without locks
+            pass
+        try:
+            yield
+        finally:
+            os.close(descriptor)
+
+    def claim(self, overwrite: bool) -> None:
+        """Raises UserError when the folder holds a run already and `overwrite` is false."""
         used = [file.name for file in (*self.files, *self._others) if file.exists()]
         if used and not overwrite:
             raise UserError(
@@ -65,10 +91,11 @@ class RunFolder:
     def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
         """Writes the settings, and the history of the episodes before a resumed run goes on.
 
-        To be called once the run's own checkpoint is there: a picture and another environment's
-        policy that were here before go. Raises UserError when the folder cannot be written.
+        To be called once the run's own checkpoint is there: a picture, another environment's
+        policy and the half-written file of a killed run that were here before go. Raises UserError
+        when the folder cannot be written.
         """
-        for file in (self.picture, *self._others):
+        for file in (self.picture, *self._others, *self.path.glob(".*.h5.*.tmp")):
             try:
                 file.unlink(missing_ok=True)
             except OSError as error:

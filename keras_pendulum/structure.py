@@ -7,10 +7,11 @@ is refused before a single array is read, so that a stranger's file costs neithe
 from __future__ import annotations
 
 import math
+import mmap
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 
@@ -22,6 +23,32 @@ _MOST_ATTRIBUTES = 64  # of one group or array
 _LARGEST_ATTRIBUTE = 2**16  # bytes, HDF5's own limit where attributes lie in an object's header
 # A text of variable length lies in a heap that cannot be measured without reading it.
 _LARGEST_FILE_WITH_TEXTS = 2**26  # bytes
+_HEAP = b"GCOL\x01"  # what such a heap starts with; HDF5 does not look at the three bytes behind
+
+
+def check_heaps(file: BinaryIO, path: str | os.PathLike[str]) -> None:
+    """Raises WeightsError for a heap of texts that HDF5 would read without an end.
+
+    HDF5 File Format Specification, "Global Heap": a head of 16 bytes with the heap's size, then
+    objects with a head of 16 bytes each, the last of which, number 0, is what is free. HDF5 goes
+    from each to the next by the sizes they state, even where that is nothing.
+    """
+    if file.seek(0, os.SEEK_END) == 0:
+        return
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        start = content.find(_HEAP)
+        while start >= 0:
+            end = start + int.from_bytes(content[start + 8 : start + 16], "little")
+            place = start + 16
+            while place + 16 <= min(end, len(content)):
+                number = int.from_bytes(content[place : place + 2], "little")
+                size = int.from_bytes(content[place + 8 : place + 16], "little")
+                # Only the free space counts its own head.
+                step = size if number == 0 else 16 + -(-size // 8) * 8
+                if step < 16 or place + step > end:
+                    raise WeightsError(f"{path}: the file is damaged, its texts cannot be read")
+                place += step
+            start = content.find(_HEAP, start + 8)
 
 
 def check(file: h5py.File, path: str | os.PathLike[str]) -> None:

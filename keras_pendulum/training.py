@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import contextlib
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -57,32 +57,41 @@ def train_dqn(
     Raises:
         ConfigError: settings and `init`, or settings and checkpoint, do not fit.
         WeightsError: the checkpoint to resume from is damaged.
-        UserError: `out` is in use or cannot be written, or the loss is no longer finite.
+        UserError: `out` is in use or cannot be written, or a loss, a weight or what the
+            environment gives is not finite; the last checkpoint is then that of a sound run.
     """
     folder = None if out is None else RunFolder(out, config.environment)
-    if resume:
-        if folder is None:
-            raise UserError("resume needs the folder of the run to go on with")
-        run = load_checkpoint(folder.weights, config, render)
-    else:
-        run = Run(config, init, render)
+    with contextlib.ExitStack() as held:
+        if resume:
+            if folder is None:
+                raise UserError("resume needs the folder of the run to go on with")
+            held.enter_context(folder.held())
+            run = load_checkpoint(folder.weights, config, render)
+        else:
+            run = Run(config, init, render)
+            if folder is not None:
+                folder.make()
+                held.enter_context(folder.held())
+                folder.claim(overwrite)
+                # Before the other files, so that no policy of another run lies beside them, and so
+                # that there is a run to resume from the start.
+                save_checkpoint(run, folder.weights)
         if folder is not None:
-            folder.claim(overwrite)
-            # Before the other files, so that no policy of another run lies beside them, and so
-            # that there is a run to resume from the start.
-            save_checkpoint(run, folder.weights)
-    if folder is not None:
-        folder.begin(config, run.history)
+            folder.begin(config, run.history)
+        finished = _learn(run, folder, listeners, should_stop)
+    return TrainingResult(run.agent.online, run.history, finished)
+
+
+def _learn(
+    run: Run,
+    folder: RunFolder | None,
+    listeners: Iterable[Callable[[EpisodeRecord], None]],
+    should_stop: Callable[[], bool],
+) -> bool:
+    """Goes on to the run's end, or to where it should stop; returns whether it is finished."""
+    config = run.config
     finished = True
-    updates = run.history[-1].updates if run.history else 0
     for record in run.episodes():
-        if record.updates > updates and not math.isfinite(record.loss):
-            # Before a checkpoint could replace a good one.
-            raise UserError(
-                f"episode {record.episode}: the loss is {record.loss}, learning has diverged; try "
-                "a smaller learning_rate"
-            )
-        updates = record.updates
         if folder is not None:
             folder.append(record)
             if record.episode % config.save_every == 0:
@@ -97,7 +106,7 @@ def train_dqn(
         if finished:
             picture = pictures.learning_curve(run.history, config.environment, _levels(config))
             write_atomically(folder.picture, picture)
-    return TrainingResult(run.agent.online, run.history, finished)
+    return finished
 
 
 def _levels(config: Config) -> dict[str, float]:

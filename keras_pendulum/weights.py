@@ -20,7 +20,7 @@ from keras_pendulum import __version__, integrity, layer_files
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.config import checked_setting
 from keras_pendulum.environment import TASKS
-from keras_pendulum.errors import ConfigError, WeightsError
+from keras_pendulum.errors import ConfigError, UserError, WeightsError
 from keras_pendulum.network import DQN, Origin
 from keras_pendulum.policy import ACTIVATIONS
 
@@ -42,7 +42,7 @@ def save_weights(
         evaluated_return: the mean return that `evaluate_policy(network)` gave, one more attribute.
 
     Raises:
-        UserError: the file cannot be written.
+        UserError: the file cannot be written, or a weight is not finite.
     """
     write_atomically(path, weights_file(network, evaluated_return=evaluated_return))
 
@@ -50,10 +50,16 @@ def save_weights(
 def weights_file(
     network: DQN, *, evaluated_return: float | None = None, **groups: dict[str, NDArray[Any]]
 ) -> bytes:
-    """The bytes of the network's `.h5`, with further groups of arrays beside the layers."""
+    """The bytes of the network's `.h5`, with further groups of arrays beside the layers.
+
+    Raises UserError when a weight is not finite: such a network is no policy.
+    """
+    weights = network.get_weights()
+    if not all(np.isfinite(array).all() for array in weights):
+        raise UserError("a weight is not finite, learning has diverged; nothing is saved")
     # In memory, in blocks that a whole checkpoint fits in; nothing is written to the disk.
     with h5py.File("weights", "w", driver="core", backing_store=False, block_size=2**23) as file:
-        layer_files.write_layers(file, network.get_weights())
+        layer_files.write_layers(file, weights)
         about = {
             "version": __version__,
             "versions": json.dumps(_versions()),

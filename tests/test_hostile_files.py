@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -164,3 +166,25 @@ def test_a_large_file_with_texts_of_no_fixed_length_is_refused(
         kp.load_weights(tmp_path / "a.weights.h5")
     kp.save_weights(kp.DQN((16, 8), 5), tmp_path / "ours.h5")
     kp.load_weights(tmp_path / "ours.h5")
+
+
+def test_random_damage_neither_crashes_nor_hangs_nor_gets_in_half() -> None:
+    """In a process of its own, because HDF5's library may take that with it."""
+    words = [sys.executable, str(Path(__file__).parent / "fuzz_files.py"), "0", "300"]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    refused, loaded = (int(part.split()[0]) for part in reversed(done.stdout.split(", ")))
+    assert refused + loaded == 300
+    assert refused > 50
+
+
+def test_a_heap_of_texts_that_never_ends_is_refused(tmp_path: Path) -> None:
+    """HDF5 itself goes round in it for ever (found by fuzz_files.py)."""
+    path = tmp_path / "a.weights.h5"
+    kp.DQN((16, 8), 5).save_weights(path)
+    content = bytearray(path.read_bytes())
+    heap = content.index(b"GCOL")
+    content[heap + 16 : heap + 32] = bytes(16)  # the first object: nothing, and as long
+    path.write_bytes(content)
+    with pytest.raises(kp.WeightsError, match="its texts cannot be read"):
+        kp.load_weights(path)

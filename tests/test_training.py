@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import os
 import signal
@@ -14,6 +15,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from conftest import command_line
+from gymnasium.wrappers import TimeLimit
 
 import keras_pendulum as kp
 from keras_pendulum.checkpoint import load_checkpoint, load_config, save_checkpoint
@@ -37,7 +39,9 @@ def assert_same(ours: kp.TrainingResult, theirs: kp.TrainingResult) -> None:
         np.testing.assert_array_equal(mine, yours)
 
 
-@pytest.mark.parametrize("name", ["original", "walkthrough", "reference", "cartpole-original"])
+@pytest.mark.parametrize(
+    "name", ["original", "walkthrough", "reference", "cartpole-original", "cartpole"]
+)
 def test_the_same_seed_twice_is_the_same_run_bit_for_bit(name: str) -> None:
     config = kp.preset(name, **SHORT)
     assert_same(kp.train_dqn(config), kp.train_dqn(config))
@@ -142,6 +146,29 @@ def test_a_run_of_another_environment_is_replaced_only_when_the_new_one_is_there
     assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
 
 
+def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+
+    def another(record: object) -> None:
+        before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+        for overwrite, resume in ((True, False), (False, True), (False, False)):
+            with pytest.raises(kp.UserError, match="another run is going on in"):
+                kp.train_dqn(config, tmp_path, overwrite=overwrite, resume=resume)
+        assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+    kp.train_dqn(config, tmp_path, listeners=[another])
+    kp.train_dqn(config, tmp_path, overwrite=True)
+
+
+def test_what_a_killed_run_left_half_written_goes(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    (tmp_path / ".pendulum_weight.h5.0123456789abcdef.tmp").touch()
+    (tmp_path / "mine.tmp").touch()
+    kp.train_dqn(config, tmp_path, resume=True)
+    assert [file.name for file in tmp_path.glob("*.tmp")] == ["mine.tmp"]
+
+
 def full_disk(descriptor: int) -> None:
     raise OSError(28, "No space left on device")
 
@@ -155,7 +182,7 @@ def test_of_two_checkpoints_the_newer_one_goes_on(tmp_path: Path) -> None:
     assert RunFolder(tmp_path).weights.name == "pendulum_weight.h5"
 
 
-@pytest.mark.parametrize("name", ["original", "walkthrough", "reference", "cartpole-original"])
+@pytest.mark.parametrize("name", ["original", "cartpole-original"])
 def test_a_stopped_and_resumed_run_ends_like_one_never_stopped(name: str, tmp_path: Path) -> None:
     # A small buffer, so that its ring has wrapped round by then.
     config = kp.preset(name, episodes=50, replay_capacity=300 if "cartpole" in name else 3000)
@@ -315,9 +342,45 @@ def test_a_run_that_diverges_stops_and_keeps_the_last_good_checkpoint(tmp_path: 
     huge = kp.DQN((8,))
     huge.head.bias.assign(np.full(41, 1e25))  # its square is beyond float32
     config = kp.preset("original", episodes=60, hidden_units=(8,))
-    with pytest.raises(kp.UserError, match=r"episode 41: the loss is inf.*diverged"):
+    with pytest.raises(kp.UserError, match=r"episode 41, step 200: the loss is inf.*diverged"):
         kp.train_dqn(config, tmp_path, init=huge)
     assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 41
+
+
+@pytest.mark.parametrize("name", ["original", "cartpole-original"])
+@pytest.mark.parametrize("broken", ["observation", "reward"])
+def test_what_is_not_finite_stops_the_run_at_its_step_and_keeps_the_last_checkpoint(
+    name: str, broken: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset(name, episodes=9, hidden_units=(8,), save_every=1)
+    steps = itertools.count(1)
+    step = TimeLimit.step
+
+    def breaking(env: Any, action: Any) -> tuple[Any, ...]:
+        observation, reward, *rest = step(env, action)
+        if next(steps) == last:
+            if broken == "reward":
+                reward = float("inf")
+            else:
+                observation[-1] = np.nan
+        return observation, reward, *rest
+
+    whole = kp.train_dqn(config).history
+    last = whole[2].environment_steps + 5  # of the run, the 5th of episode 3
+    monkeypatch.setattr(TimeLimit, "step", breaking)
+    with pytest.raises(kp.UserError, match=f"^episode 3, step 5: the environment gave.*{broken}"):
+        kp.train_dqn(config, tmp_path)
+    assert len(load_checkpoint(RunFolder(tmp_path).weights, config).history) == 3
+
+
+def test_a_network_with_a_weight_that_is_not_finite_is_not_saved(tmp_path: Path) -> None:
+    run = Run(kp.preset("original", hidden_units=(8,)))
+    save_checkpoint(run, tmp_path / "a.h5")
+    before = (tmp_path / "a.h5").read_bytes()
+    run.agent.online.head.bias.assign(np.full(41, np.nan))
+    with pytest.raises(kp.UserError, match="a weight is not finite"):
+        save_checkpoint(run, tmp_path / "a.h5")
+    assert (tmp_path / "a.h5").read_bytes() == before
 
 
 def test_initial_weights_are_the_given_networks(tmp_path: Path) -> None:
