@@ -2,9 +2,10 @@
 
     python -m benchmarks.long_run [EPISODES]
 
-Trains the preset `reference` that long, with all that the command keeps on disk, and watches the
-process: memory and seconds an episode, early (the 500 episodes after ε has reached its floor) and
-at the end. Three minutes.
+Trains the preset `reference` that long, with all that the command keeps on disk and a checkpoint
+every 10 episodes, and watches the process and its folder: memory, seconds an episode, open files,
+files in the folder and the checkpoint's size, early (the 500 episodes after ε has reached its
+floor) and at the end. Three minutes; 20000 episodes take ten.
 """
 
 from __future__ import annotations
@@ -33,14 +34,18 @@ def main(episodes: int = 5000) -> None:
     """Trains, watching, and writes the table."""
     memory: list[float] = []
     seconds: list[float] = []
+    left: list[tuple[int, int, float]] = []  # open files, files in the folder, the checkpoint's MB
 
     def watch(record: EpisodeRecord) -> None:
         memory.append(resident())
         seconds.append(record.seconds)
+        opened, kept = (len(list(Path(folder).iterdir())) for folder in ("/proc/self/fd", run))
+        left.append((opened, kept, (run / "pendulum_weight.h5").stat().st_size / 1e6))
 
     config = kp.preset("reference", episodes=episodes)
     with tempfile.TemporaryDirectory() as folder:
-        kp.train_dqn(config, Path(folder) / "run", listeners=[watch])
+        run = Path(folder) / "run"
+        kp.train_dqn(config, run, listeners=[watch])
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
     rows = []
     for name, first in (("early", WINDOW), ("at the end", episodes - WINDOW)):
@@ -50,9 +55,13 @@ def main(episodes: int = 5000) -> None:
                 "episodes": f"{first} to {first + WINDOW - 1}, {name}",
                 "resident memory, MB": round(statistics.median(memory[window])),
                 "ms an episode": round(1e3 * statistics.median(seconds[window]), 2),
+                "open files": max(opened for opened, _, _ in left[window]),
+                "files in the folder": max(files for _, files, _ in left[window]),
+                "checkpoint, MB": round(left[window][-1][2], 2),
             }
         )
-    rows.append({"episodes": "all", "resident memory, MB": f"peak {peak:.0f}", "ms an episode": ""})
+    peak_row = dict.fromkeys(rows[0], "")
+    rows.append({**peak_row, "episodes": "all", "resident memory, MB": f"peak {peak:.0f}"})
     write("long_run", "python -m benchmarks.long_run", rows)
 
 

@@ -127,23 +127,28 @@ HOSTILE: dict[str, tuple[Change, str]] = {
 }
 
 
+def hostile_file(path: Path, change: Change, layout: str) -> Path:
+    """A good file of `layout`, changed."""
+    network = kp.DQN((16, 8), 5)
+    if layout == "keras 2":
+        kp.save_weights(network, path)
+    else:
+        network.save_weights(path.with_suffix(".weights.h5"))
+        path.with_suffix(".weights.h5").rename(path)
+    assert kp.load_weights(path).hidden_units == (16, 8)
+    # The newest format is the one that lets attributes be huge.
+    with h5py.File(path, "r+", libver="latest") as file:
+        change(file, KERNEL[layout])
+    return path
+
+
 @pytest.mark.parametrize("layout", KERNEL)
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_it_is_refused_in_one_line_before_an_array_is_read(
     kind: str, layout: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     change, message = HOSTILE[kind]
-    network = kp.DQN((16, 8), 5)
-    path = tmp_path / "hostile.h5"
-    if layout == "keras 2":
-        kp.save_weights(network, path)
-    else:
-        network.save_weights(tmp_path / "a.weights.h5")
-        (tmp_path / "a.weights.h5").rename(path)
-    assert kp.load_weights(path).hidden_units == (16, 8)
-    # The newest format is the one that lets attributes be huge.
-    with h5py.File(path, "r+", libver="latest") as file:
-        change(file, KERNEL[layout])
+    path = hostile_file(tmp_path / "hostile.h5", change, layout)
 
     def read(*parts: object) -> None:
         raise AssertionError("an array was read")
