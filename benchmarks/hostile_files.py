@@ -3,7 +3,8 @@
     python -m benchmarks.hostile_files
 
 The files of tests/test_hostile_files.py in both layouts, and one with a million names; for each the
-seconds that `load_weights` takes to refuse it and by how much the process has then grown. A minute.
+seconds that `load_weights` takes to refuse it and by how much the process has then grown. Needs the
+extra `test`; a minute.
 """
 
 from __future__ import annotations

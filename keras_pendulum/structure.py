@@ -17,7 +17,7 @@ import h5py
 
 from keras_pendulum.errors import WeightsError
 
-_MOST_ENTRIES = 2000  # groups and arrays; a checkpoint has about 60
+_MOST_ENTRIES = 1000  # groups and arrays; a checkpoint has about 60
 _DEEPEST = 10  # groups inside groups; Keras 3 goes down to 4
 _MOST_ATTRIBUTES = 64  # of one group or array
 _LARGEST_ATTRIBUTE = 2**16  # bytes, HDF5's own limit where attributes lie in an object's header

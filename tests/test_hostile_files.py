@@ -61,7 +61,7 @@ def unwritten(file: h5py.File, name: str) -> None:
 
 
 def same_array_again_and_again(file: h5py.File, kernel: str) -> None:
-    for i in range(1500):
+    for i in range(900):
         file[f"again_{i}"] = file[kernel]
 
 
