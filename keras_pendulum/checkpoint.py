@@ -17,7 +17,7 @@ from keras_pendulum.config import Config
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import ConfigError, WeightsError
 from keras_pendulum.run import Run
-from keras_pendulum.weights import weights_file
+from keras_pendulum.weights import require_finite, weights_file
 
 # A resumed run may be made longer or saved at other times; anything else would be another run.
 _MAY_CHANGE = {"episodes", "save_every"}
@@ -26,10 +26,12 @@ _MAY_CHANGE = {"episodes", "save_every"}
 def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
     """Writes the run as it stands between two episodes.
 
-    Raises UserError when the file cannot be written, or a weight is not finite; an old checkpoint
-    is then unharmed.
+    Raises UserError when the file cannot be written, or a weight or a variable of the optimizer is
+    not finite; an old checkpoint is then unharmed.
     """
     agent = run.agent.get_state()
+    for arrays in agent.values():
+        require_finite(arrays)
     state = {
         "config": asdict(run.config),
         "random": run.random.get_state(),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -55,8 +56,7 @@ def weights_file(
     Raises UserError when a weight is not finite: such a network is no policy.
     """
     weights = network.get_weights()
-    if not all(np.isfinite(array).all() for array in weights):
-        raise UserError("a weight is not finite, learning has diverged; nothing is saved")
+    require_finite(weights)
     # In memory, in blocks that a whole checkpoint fits in; nothing is written to the disk.
     with h5py.File("weights", "w", driver="core", backing_store=False, block_size=2**23) as file:
         layer_files.write_layers(file, weights)
@@ -81,6 +81,12 @@ def weights_file(
         file.flush()
         image: bytes = file.id.get_file_image()
     return integrity.sealed(image)
+
+
+def require_finite(arrays: Iterable[NDArray[Any]]) -> None:
+    """Raises UserError when a number is not finite: no reader would take the file."""
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise UserError("a weight is not finite, learning has diverged; nothing is saved")
 
 
 def load_weights(path: str | os.PathLike[str]) -> DQN:
