@@ -9,8 +9,8 @@ from pathlib import Path
 from keras_pendulum.errors import UserError
 
 
-def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
-    """Puts `data` at `path`: written beside it, flushed to the disk, and swapped in.
+def write_atomically(path: str | os.PathLike[str], *parts: bytes) -> None:
+    """Puts the parts at `path`: written beside it, flushed to the disk, and swapped in.
 
     Raises UserError when the file system refuses; an old file at `path` is then unharmed.
     """
@@ -21,7 +21,7 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
             raise IsADirectoryError(None, "it is a folder")
         try:
             with open(fresh, "xb") as file:
-                file.write(data)
+                file.writelines(parts)
                 file.flush()
                 os.fsync(file.fileno())
             fresh.replace(target)

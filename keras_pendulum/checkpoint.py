@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -12,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum import layer_files
-from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.config import Config
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import ConfigError, WeightsError
+from keras_pendulum.integrity import write_sealed
 from keras_pendulum.run import Run
 from keras_pendulum.weights import require_finite, weights_file
 
@@ -29,6 +31,44 @@ def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
     Raises UserError when the file cannot be written, or a weight or a variable of the optimizer is
     not finite; an old checkpoint is then unharmed.
     """
+    write_sealed(path, _content(run))
+
+
+class CheckpointWriter:
+    """Saves a run while it goes on.
+
+    The run waits until there is a file's content; a thread of its own takes the digest and writes
+    to the disk. Leaving the `with` block waits for the last one.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = path
+        self._thread = ThreadPoolExecutor(1, "checkpoint")
+        self._last: Future[None] | None = None
+
+    def save(self, run: Run) -> None:
+        """Begins a checkpoint of the run as it stands, once the one before it is written.
+
+        Raises UserError as `save_checkpoint` does, and when the one before failed.
+        """
+        content = _content(run)
+        self._wait()
+        self._last = self._thread.submit(write_sealed, self.path, content)
+
+    def _wait(self) -> None:
+        if self._last is not None:
+            self._last.result()
+
+    def __enter__(self) -> CheckpointWriter:
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        self._thread.shutdown()
+        if problem[0] is None:
+            self._wait()
+
+
+def _content(run: Run) -> bytes:
     agent = run.agent.get_state()
     for arrays in agent.values():
         require_finite(arrays)
@@ -38,16 +78,17 @@ def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
         "environment": run.env.unwrapped.np_random.bit_generator.state,
         "replay_added": run.replay.added,
     }
-    history = np.array(run.history, np.float64).reshape(-1, len(EpisodeRecord._fields))
-    content = weights_file(
+    return weights_file(
         run.agent.online,
-        target=_numbered(agent["target"]),
-        optimizer=_numbered(agent["optimizer"]),
+        target=_flat(agent["target"]),
+        optimizer=_flat(agent["optimizer"]),
         replay=run.replay.get_state(),
-        # JSON as an array: an attribute can hold no more than 64 KB.
-        run={"state": np.frombuffer(json.dumps(state).encode(), np.uint8), "history": history},
+        run={
+            # JSON as an array: an attribute can hold no more than 64 KB.
+            "state": np.frombuffer(json.dumps(state).encode(), np.uint8),
+            "history": np.array(run.history, np.float64).reshape(-1, len(EpisodeRecord._fields)),
+        },
     )
-    write_atomically(path, content)
 
 
 def load_config(path: str | os.PathLike[str]) -> Config:
@@ -86,7 +127,8 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
             )
         run = Run(config, render=render)
         online = layer_files.read_layers(file, path, run.agent.online.observation_size)
-        agent = {name: list(_arrays(file, name, path).values()) for name in ("target", "optimizer")}
+        fresh = run.agent.get_state()
+        agent = {name: _shaped(_arrays(file, name, path), fresh[name]) for name in fresh}
         run.agent.set_state(online, agent)
         run.replay.set_state(_arrays(file, "replay", path), state["replay_added"])
         run.random.set_state(state["random"])
@@ -117,9 +159,26 @@ def _arrays(file: h5py.File, group: str, path: str | os.PathLike[str]) -> dict[s
     return {name: layer_files.read_array(entry, path) for name, entry in file[group].items()}
 
 
-def _numbered(arrays: list[NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    # Zero-padded, because HDF5 lists names in the order of their letters.
-    return {f"{i:03}": array for i, array in enumerate(arrays)}
+def _flat(arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Their numbers, one after the other, by type: few arrays are written faster than many."""
+    types = dict.fromkeys(array.dtype.name for array in arrays)
+    return {
+        name: np.concatenate([array.ravel() for array in arrays if array.dtype.name == name])
+        for name in types
+    }
+
+
+def _shaped(flat: dict[str, NDArray[Any]], like: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
+    """The arrays of `_flat`, of the shapes of `like`. Raises ValueError when they do not fit."""
+    rest = dict(flat)
+    arrays = []
+    for array in like:
+        name = array.dtype.name
+        arrays.append(rest[name][: array.size].reshape(array.shape))
+        rest[name] = rest[name][array.size :]
+    if any(map(len, rest.values())):
+        raise ValueError("more numbers than the agent has")
+    return arrays
 
 
 def _record(row: NDArray[np.float64]) -> EpisodeRecord:

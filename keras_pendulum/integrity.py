@@ -10,15 +10,17 @@ import hashlib
 import os
 from typing import BinaryIO
 
+from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.errors import WeightsError
 
 _MARK = b"\nkeras_pendulum sha256 "
 _SEAL = len(_MARK) + 64  # bytes
 
 
-def sealed(image: bytes) -> bytes:
-    """A file's bytes with their digest behind them."""
-    return image + _MARK + hashlib.sha256(image).hexdigest().encode()
+def write_sealed(path: str | os.PathLike[str], content: bytes) -> None:
+    """Puts the content and its digest at `path`. Raises UserError as `write_atomically` does."""
+    digest = hashlib.sha256(content).hexdigest()
+    write_atomically(path, content, _MARK + digest.encode())
 
 
 def verify(file: BinaryIO, path: str | os.PathLike[str]) -> None:

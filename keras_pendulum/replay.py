@@ -69,7 +69,11 @@ class ReplayBuffer:
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """All stored transitions, oldest first, one array a field."""
-        return self.at(np.arange(len(self)))._asdict()
+        start = self._added % self.capacity if self._added > self.capacity else 0
+        return {
+            name: np.concatenate([array[start : len(self)], array[:start]])
+            for name, array in self._arrays._asdict().items()
+        }
 
     def set_state(self, state: dict[str, NDArray[Any]], added: int) -> None:
         """Takes the transitions of `get_state`; `added` is how many were ever added.

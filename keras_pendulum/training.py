@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from keras_pendulum import pictures
 from keras_pendulum.atomic_file import write_atomically
-from keras_pendulum.checkpoint import load_checkpoint, save_checkpoint
+from keras_pendulum.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 from keras_pendulum.config import Config
 from keras_pendulum.environment import TASKS
 from keras_pendulum.episodes import EpisodeRecord
@@ -76,37 +76,49 @@ def train_dqn(
                 # Before the other files, so that no policy of another run lies beside them, and so
                 # that there is a run to resume from the start.
                 save_checkpoint(run, folder.weights)
-        if folder is not None:
+        if folder is None:
+            finished = _learn(run, listeners, should_stop)
+        else:
             folder.begin(config, run.history)
-        finished = _learn(run, folder, listeners, should_stop)
+            finished = _learn_and_keep(run, folder, listeners, should_stop)
     return TrainingResult(run.agent.online, run.history, finished)
 
 
-def _learn(
+def _learn_and_keep(
     run: Run,
-    folder: RunFolder | None,
+    folder: RunFolder,
     listeners: Iterable[Callable[[EpisodeRecord], None]],
     should_stop: Callable[[], bool],
 ) -> bool:
-    """Goes on to the run's end, or to where it should stop; returns whether it is finished."""
+    """As `_learn`, with a checkpoint now and then, and at the end a last one and the picture."""
     config = run.config
-    finished = True
-    for record in run.episodes():
-        if folder is not None:
+    with CheckpointWriter(folder.weights) as writer:
+
+        def keep(record: EpisodeRecord) -> None:
             folder.append(record)
             if record.episode % config.save_every == 0:
-                save_checkpoint(run, folder.weights)
-        for listener in listeners:
-            listener(record)
-        if should_stop() and record.episode + 1 < config.episodes:
-            finished = False
-            break
-    if folder is not None:
-        save_checkpoint(run, folder.weights)
+                writer.save(run)
+
+        finished = _learn(run, [keep, *listeners], should_stop)
+        writer.save(run)
         if finished:
             picture = pictures.learning_curve(run.history, config.environment, _levels(config))
             write_atomically(folder.picture, picture)
     return finished
+
+
+def _learn(
+    run: Run,
+    listeners: Iterable[Callable[[EpisodeRecord], None]],
+    should_stop: Callable[[], bool],
+) -> bool:
+    """Goes on to the run's end, or to where it should stop; returns whether it is finished."""
+    for record in run.episodes():
+        for listener in listeners:
+            listener(record)
+        if should_stop() and record.episode + 1 < run.config.episodes:
+            return False
+    return True
 
 
 def _levels(config: Config) -> dict[str, float]:

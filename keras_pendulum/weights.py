@@ -17,11 +17,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum import __version__, integrity, layer_files
-from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum import __version__, layer_files
 from keras_pendulum.config import checked_setting
 from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import ConfigError, UserError, WeightsError
+from keras_pendulum.integrity import write_sealed
 from keras_pendulum.network import DQN, Origin
 from keras_pendulum.policy import ACTIVATIONS
 
@@ -45,19 +45,19 @@ def save_weights(
     Raises:
         UserError: the file cannot be written, or a weight is not finite.
     """
-    write_atomically(path, weights_file(network, evaluated_return=evaluated_return))
+    write_sealed(path, weights_file(network, evaluated_return=evaluated_return))
 
 
 def weights_file(
     network: DQN, *, evaluated_return: float | None = None, **groups: dict[str, NDArray[Any]]
 ) -> bytes:
-    """The bytes of the network's `.h5`, with further groups of arrays beside the layers.
+    """The network's `.h5`, without its digest, with further groups of arrays beside the layers.
 
     Raises UserError when a weight is not finite: such a network is no policy.
     """
     weights = network.get_weights()
     require_finite(weights)
-    # In memory, in blocks that a whole checkpoint fits in; nothing is written to the disk.
+    # In memory, a megabyte at a time; nothing is written to the disk.
     with h5py.File("weights", "w", driver="core", backing_store=False, block_size=2**23) as file:
         layer_files.write_layers(file, weights)
         about = {
@@ -75,12 +75,10 @@ def weights_file(
                 # bound.
                 attributes[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
         for name, arrays in groups.items():
-            group = file.create_group(name)
-            for key, array in arrays.items():
-                group.create_dataset(key, data=array)
+            layer_files.write_arrays(file.create_group(name), arrays)
         file.flush()
         image: bytes = file.id.get_file_image()
-    return integrity.sealed(image)
+    return image
 
 
 def require_finite(arrays: Iterable[NDArray[Any]]) -> None:

@@ -18,7 +18,13 @@ from conftest import command_line
 from gymnasium.wrappers import TimeLimit
 
 import keras_pendulum as kp
-from keras_pendulum.checkpoint import load_checkpoint, load_config, save_checkpoint
+from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.checkpoint import (
+    CheckpointWriter,
+    load_checkpoint,
+    load_config,
+    save_checkpoint,
+)
 from keras_pendulum.run import Run
 from keras_pendulum.run_folder import RunFolder
 
@@ -98,22 +104,44 @@ def test_a_run_leaves_its_four_files(tmp_path: Path) -> None:
     assert picture[..., :3].std() > 0.05  # something is drawn
 
 
-def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(tmp_path: Path) -> None:
-    path = tmp_path / "pendulum_weight.h5"
-    saved: list[int] = []
-    before: bytes | None = None
-
-    def look(record: Any) -> None:
-        nonlocal before
-        content = path.read_bytes() if path.exists() else None
-        if content != before:
-            saved.append(record.episode)
-            before = content
-
+def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config = kp.preset("original", episodes=24, hidden_units=(8,))
-    kp.train_dqn(config, tmp_path, listeners=[look])
-    assert saved == [0, 10, 20]
-    assert len(load_checkpoint(path, config).history) == 24
+    contents: list[bytes] = []
+
+    def write(path: Path, *parts: bytes) -> None:
+        contents.append(b"".join(parts))
+        write_atomically(path, *parts)
+
+    monkeypatch.setattr("keras_pendulum.integrity.write_atomically", write)
+    kp.train_dqn(config, tmp_path / "run")
+    assert (tmp_path / "run" / "pendulum_weight.h5").read_bytes() == contents[-1]
+    episodes = []
+    for content in contents:
+        (tmp_path / "one.h5").write_bytes(content)
+        episodes.append(len(load_checkpoint(tmp_path / "one.h5", config).history))
+    assert episodes == [0, 1, 11, 21, 24]
+
+
+def test_a_checkpoint_that_fails_beside_the_run_ends_it_and_the_last_good_one_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=40, hidden_units=(8,))
+    seen: list[Any] = []
+    # The checkpoints before the first episode and of episodes 0 and 10, settings and history.
+    left = iter(range(5))
+    fsync = os.fsync
+    monkeypatch.setattr(
+        "keras_pendulum.atomic_file.os.fsync",
+        lambda file: full_disk(file) if next(left, None) is None else fsync(file),
+    )
+    with pytest.raises(kp.UserError, match=r"cannot write .*No space left"):
+        kp.train_dqn(config, tmp_path, listeners=[seen.append])
+    assert seen[-1].episode == 29  # the checkpoint of episode 20 failed, that of 30 is told
+    monkeypatch.undo()
+    assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 11
+    assert not list(tmp_path.glob(".*"))
 
 
 def test_a_used_folder_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
@@ -146,8 +174,12 @@ def test_a_run_of_another_environment_is_replaced_only_when_the_new_one_is_there
     assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
 
 
-def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
+def test_two_runs_do_not_share_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = kp.preset("original", episodes=2, hidden_units=(8,))
+    # At once, for a look at the folder as it stands.
+    monkeypatch.setattr(
+        CheckpointWriter, "save", lambda writer, run: save_checkpoint(run, writer.path)
+    )
 
     def another(record: object) -> None:
         before = {file: file.read_bytes() for file in tmp_path.iterdir()}
@@ -287,12 +319,14 @@ CHECKPOINT_DAMAGE: dict[str, Callable[[h5py.File], None]] = {
     "replay is an array": lambda file: replaced(file, "replay", np.zeros(3)),
     "one reward for all": lambda file: replaced(file, "replay/reward", np.zeros(1, np.float32)),
     "no rewards": lambda file: file["replay"].__delitem__("reward"),
-    "one number as optimizer state": lambda file: replaced(file, "optimizer/003", np.float32(1)),
-    "too few optimizer variables": lambda file: file["optimizer"].__delitem__("003"),
-    "other target": lambda file: replaced(file, "target/000", np.zeros((3, 9), np.float32)),
+    "one number as optimizer state": lambda file: replaced(
+        file, "optimizer/float32", np.float32(1)
+    ),
+    "too few optimizer variables": lambda file: file["optimizer"].__delitem__("int64"),
+    "other target": lambda file: replaced(file, "target/float32", np.zeros(402, np.float32)),
     "not JSON": lambda file: replaced(file, "run/state", np.zeros(50, np.uint8)),
     "NaN in the optimizer": lambda file: replaced(
-        file, "optimizer/003", np.full((3, 8), np.nan, np.float32)
+        file, "optimizer/float32", np.full(804, np.nan, np.float32)
     ),
 }
 
