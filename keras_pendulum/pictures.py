@@ -4,38 +4,69 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environment import TASKS
-from keras_pendulum.episodes import EpisodeRecord
+from keras_pendulum.phase_plane import EXTENT, PhasePlane
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import GridSpecBase
+
+    from keras_pendulum.episodes import EpisodeRecord
 
 _LEVEL_LINES = (("black", "--"), ("#D55E00", ":"))
 
 
-def learning_curve(
-    history: Sequence[EpisodeRecord], environment: str, returns: Mapping[str, float]
+def finished_run(
+    history: Sequence[EpisodeRecord],
+    environment: str,
+    returns: Mapping[str, float],
+    planes: Mapping[str, PhasePlane],
 ) -> bytes:
-    """The originals' plots: episode against average reward a step, or against CartPole's return.
+    """A run at a look: the originals' learning curve, ε, loss, and maps of the phase plane.
+
+    The curve is the average reward a step, or CartPole's return, over the episodes.
 
     Args:
         history: at least one record.
         environment: which the episodes are of.
         returns: mean returns of whole episodes to compare with, by name; each a level line.
+        planes: maps to set side by side, by name; may be empty.
 
     Returns:
         A PNG file's bytes.
     """
-    task = TASKS[environment]
-    if task.never_terminates:
-        rewards = [record.average_reward for record in history]
-        levels = {name: level / task.steps_per_episode for name, level in returns.items()}
-        return _curve(rewards, "Average reward per step", mean_over=10, levels=levels)
-    # Where each step earns 1, the return is what differs.
-    steps = [record.episode_return for record in history]
-    return _curve(steps, "Return (steps)", mean_over=10, levels=returns)
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 12.5 if planes else 6), layout="constrained")
+    grid = figure.add_gridspec(4 if planes else 2, 2)
+    _draw_learning_curve(figure.add_subplot(grid[0, :]), history, environment, returns)
+    epsilon, loss = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
+    episodes = [record.episode for record in history]
+    epsilon.plot(episodes, [record.epsilon for record in history], color="#0072B2")
+    epsilon.set(xlabel="Episode", ylabel="ε, share of random actions", ylim=(0, 1))
+    losses = [record.loss for record in history]
+    loss.plot(episodes, losses, ".", color="0.3", markersize=3)
+    loss.set(xlabel="Episode", ylabel="Loss", xlim=epsilon.get_xlim())
+    if any(value > 0 for value in losses):
+        loss.set_yscale("log")
+    if planes:
+        _draw_planes(figure, grid[2:, :].subgridspec(2, len(planes)), planes)
+    return _png(figure)
+
+
+def phase_planes(planes: Mapping[str, PhasePlane]) -> bytes:
+    """Greedy torque and value over the phase plane, one column for each policy: a PNG."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 6.5), layout="constrained")
+    _draw_planes(figure, figure.add_gridspec(2, len(planes)), planes)
+    return _png(figure)
 
 
 def live_curve(returns: Sequence[float]) -> bytes:
@@ -47,17 +78,38 @@ def live_curve(returns: Sequence[float]) -> bytes:
     Returns:
         A PNG file's bytes.
     """
-    return _curve(returns, "Return", mean_over=100, levels={})
-
-
-def _curve(
-    values: Sequence[float], label: str, *, mean_over: int, levels: Mapping[str, float]
-) -> bytes:
-    """A value for each episode from 0 on, with its running mean and level lines: a PNG."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8, 4.5), layout="constrained")
-    axes = figure.subplots()
+    _draw_curve(figure.subplots(), returns, "Return", mean_over=100, levels={})
+    return _png(figure)
+
+
+def _draw_learning_curve(
+    axes: Axes,
+    history: Sequence[EpisodeRecord],
+    environment: str,
+    returns: Mapping[str, float],
+) -> None:
+    task = TASKS[environment]
+    if task.never_terminates:
+        values = [record.average_reward for record in history]
+        levels = {name: level / task.steps_per_episode for name, level in returns.items()}
+        _draw_curve(axes, values, "Average reward per step", mean_over=10, levels=levels)
+    else:  # where each step earns 1, the return is what differs
+        values = [record.episode_return for record in history]
+        _draw_curve(axes, values, "Return (steps)", mean_over=10, levels=returns)
+
+
+def _draw_curve(
+    axes: Axes,
+    values: Sequence[float],
+    label: str,
+    *,
+    mean_over: int,
+    levels: Mapping[str, float],
+) -> None:
+    """A value for each episode from 0 on, with its running mean and level lines."""
     axes.plot(values, ".", color="0.65", markersize=4, label="episode")
     if len(values) >= mean_over:
         mean = np.convolve(values, np.ones(mean_over) / mean_over, "valid")
@@ -65,11 +117,44 @@ def _curve(
         axes.plot(range(mean_over - 1, len(values)), mean, color="#0072B2", linewidth=2, label=name)
     for (name, level), (color, style) in zip(levels.items(), _LEVEL_LINES, strict=False):
         axes.axhline(level, color=color, linestyle=style, label=name)
-    axes.set_xlabel("Episode")
-    axes.set_ylabel(label)
-    figure.legend(loc="outside upper center", ncols=4)  # where it covers no episode
+    axes.set(xlabel="Episode", ylabel=label)
+    # Above, where it covers no episode.
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, frameon=False)
+
+
+def _draw_planes(figure: Figure, grid: GridSpecBase, planes: Mapping[str, PhasePlane]) -> None:
+    """Torques in the upper row and values in the lower one, each row on one scale.
+
+    Both colour maps grow lighter all the way, so that they can be read in black and white.
+    """
+    rows = {
+        "torque": ("Greedy torque (N·m)", "cividis"),
+        "value": ("Value (discounted reward to come)", "viridis"),
+    }
+    for row, (part, (label, colors)) in enumerate(rows.items()):
+        maps = {name: getattr(plane, part) for name, plane in planes.items()}
+        shown = np.stack(list(maps.values()))
+        drawn = []
+        for column, (name, values) in enumerate(maps.items()):
+            axes = figure.add_subplot(grid[row, column])
+            image = axes.imshow(
+                values,
+                origin="lower",
+                extent=EXTENT,
+                aspect="auto",
+                cmap=colors,
+                vmin=shown.min(),
+                vmax=shown.max(),
+            )
+            axes.set_xticks([-np.pi, 0, np.pi], ["-π", "0 (upright)", "π"])
+            axes.set(title=name, xlabel="θ (rad)", ylabel="θ̇ (rad/s)")
+            drawn.append(axes)
+        figure.colorbar(image, ax=drawn, label=label)
+
+
+def _png(figure: Figure) -> bytes:
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=120)
+    figure.savefig(stream, format="png", dpi=100)
     return stream.getvalue()
 
 

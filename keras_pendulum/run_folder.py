@@ -7,6 +7,7 @@ import fcntl
 import json
 import math
 import os
+import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -41,6 +42,7 @@ class RunFolder:
         self.history = self.path / "history.csv"
         self.config = self.path / "config.json"
         self.picture = self.path / "rewards.png"
+        self.events = self.path / "tensorboard"
 
     @property
     def files(self) -> list[Path]:
@@ -91,10 +93,12 @@ class RunFolder:
     def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
         """Writes the settings, and the history of the episodes before a resumed run goes on.
 
-        To be called once the run's own checkpoint is there: a picture, another environment's
-        policy and the half-written file of a killed run that were here before go. Raises UserError
-        when the folder cannot be written.
+        To be called once the run's own checkpoint is there: what was here before of another run
+        or of a killed one goes. Raises UserError when the folder cannot be written.
         """
+        history = list(history)
+        if not history:
+            shutil.rmtree(self.events, ignore_errors=True)
         for file in (self.picture, *self._others, *self.path.glob(".*.h5.*.tmp")):
             try:
                 file.unlink(missing_ok=True)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 import shlex
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,8 +22,10 @@ from keras_pendulum.command_line import (
 )
 from keras_pendulum.config import Config
 from keras_pendulum.display import require_display
+from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.presets import PRESETS, preset
+from keras_pendulum.progress import make_progress
 
 if TYPE_CHECKING:
     from keras_pendulum.episodes import EpisodeRecord
@@ -53,6 +54,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--live", action="store_true", help="draw the returns while they come")
     shown.add_argument("--render", action="store_true", help="show the environment in a window")
+    parser.add_argument("--quiet", action="store_true", help="print the closing lines alone")
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write DIR/tensorboard (extra `tensorboard`)"
+    )
     add_config_flags(parser, skip=["preset"])
     arguments = parser.parse_args(argv)
     return run_command(lambda: _train(arguments))
@@ -72,6 +77,7 @@ def _train(arguments: argparse.Namespace) -> int:
     with quick_import():
         from keras_pendulum.checkpoint import load_config
         from keras_pendulum.run_folder import RunFolder
+        from keras_pendulum.tensorboard_log import TensorBoardLog
         from keras_pendulum.training import train_dqn
         from keras_pendulum.weights import find_weights, load_weights
 
@@ -81,6 +87,9 @@ def _train(arguments: argparse.Namespace) -> int:
         config = replace(load_config(RunFolder(out).weights), **settings)
     init = load_weights(find_weights(arguments.init)) if arguments.init else None
 
+    folder = RunFolder(out, config.environment)
+    log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
+    progress = None if arguments.quiet else make_progress(config)
     started = time.perf_counter()
     with _Interrupt(config) as interrupt:
         result = train_dqn(
@@ -90,12 +99,15 @@ def _train(arguments: argparse.Namespace) -> int:
             overwrite=arguments.overwrite,
             resume=arguments.resume,
             render=arguments.render,
-            listeners=[_progress(config), interrupt.listen, *([live] if live else [])],
+            listeners=[each for each in (progress, interrupt.listen, live, log) if each],
+            on_checkpoint=log.on_checkpoint if log else lambda network, episode: None,
             should_stop=lambda: interrupt.asked,
         )
     if live:
         live.finish()
-    _print_summary(result, RunFolder(out, config.environment), time.perf_counter() - started)
+    if sys.stdout.isatty() and progress and not result.finished:
+        print()  # the bar is still on its line
+    _print_summary(result, folder, time.perf_counter() - started)
     return 0 if result.finished else 130
 
 
@@ -134,37 +146,10 @@ class _Interrupt:
         signal.signal(signal.SIGINT, self._before)
 
 
-def _progress(config: Config) -> Callable[[EpisodeRecord], None]:
-    """A bar on a terminal; elsewhere the original's line for each episode."""
-    if not sys.stdout.isatty():
-        return lambda record: print(record.line(), flush=True)
-    import keras
-
-    bar: keras.utils.Progbar | None = None
-    first = 0
-
-    def show(record: EpisodeRecord) -> None:
-        nonlocal bar, first
-        if bar is None:  # now it is known where a resumed run goes on
-            first = record.episode
-            names = ["return", "epsilon", "loss"]
-            bar = keras.utils.Progbar(
-                config.episodes - first, unit_name="episode", stateful_metrics=names
-            )
-        values = [("return", record.episode_return), ("epsilon", record.epsilon)]
-        if not math.isnan(record.loss):
-            values.append(("loss", record.loss))
-        bar.update(record.episode + 1 - first, values)
-
-    return show
-
-
 def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) -> None:
     from keras_pendulum.evaluation import evaluate_policy, random_return
 
     last = result.history[-1]
-    if sys.stdout.isatty() and not result.finished:
-        print()  # the bar is still on its line
     state = "Trained" if result.finished else "Interrupted after"
     print(
         f"{state} {last.episode + 1} episodes ({last.environment_steps} steps, {last.updates} "
@@ -177,10 +162,22 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
         print(f"Uniformly random actions on the same starts: {chance:.2f}")
     saved = ", ".join(file.name for file in folder.files if file.exists())
     print(f"Saved in {folder.path}: {saved}")
+    print(_what_next(result, folder))
+
+
+def _what_next(result: TrainingResult, folder: RunFolder) -> str:
+    weights = shlex.quote(str(folder.weights))
     if not result.finished:
-        print(
-            f"Go on: python -m keras_pendulum.train --resume --out {shlex.quote(str(folder.path))}"
-        )
+        commands = {"Go on": f"train --resume --out {shlex.quote(str(folder.path))}"}
+    elif TASKS[result.network.origin.environment].has_torque:
+        commands = {
+            "Watch it": f"evaluate {weights} --episodes 3 --render",
+            "Play against it": f"play --against {weights}",
+            "Take it to a browser": f"page {weights}",
+        }
+    else:
+        commands = {"Watch it": f"evaluate {weights} --episodes 3 --render"}
+    return "\n".join(f"{what}: python -m keras_pendulum.{do}" for what, do in commands.items())
 
 
 if __name__ == "__main__":

@@ -16,7 +16,8 @@ from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import UserError
 from keras_pendulum.evaluation import random_return
 from keras_pendulum.network import DQN
-from keras_pendulum.optimum import optimal_return
+from keras_pendulum.optimum import USUAL_SEEDS, optimal_return
+from keras_pendulum.phase_plane import beside_optimum
 from keras_pendulum.run import Run
 from keras_pendulum.run_folder import RunFolder
 
@@ -39,6 +40,7 @@ def train_dqn(
     overwrite: bool = False,
     resume: bool = False,
     listeners: Iterable[Callable[[EpisodeRecord], None]] = (),
+    on_checkpoint: Callable[[DQN, int], None] = lambda network, episode: None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> TrainingResult:
     """Trains a DQN.
@@ -52,6 +54,7 @@ def train_dqn(
         resume: go on from the checkpoint in `out`; `config` may only change `episodes` and
             `save_every`.
         listeners: called with the record of each episode.
+        on_checkpoint: called with the network as it stands, and the episode, at each checkpoint.
         should_stop: asked after each episode; true ends the run there, with a checkpoint.
 
     Raises:
@@ -80,7 +83,7 @@ def train_dqn(
             finished = _learn(run, listeners, should_stop)
         else:
             folder.begin(config, run.history)
-            finished = _learn_and_keep(run, folder, listeners, should_stop)
+            finished = _learn_and_keep(run, folder, listeners, on_checkpoint, should_stop)
     return TrainingResult(run.agent.online, run.history, finished)
 
 
@@ -88,6 +91,7 @@ def _learn_and_keep(
     run: Run,
     folder: RunFolder,
     listeners: Iterable[Callable[[EpisodeRecord], None]],
+    on_checkpoint: Callable[[DQN, int], None],
     should_stop: Callable[[], bool],
 ) -> bool:
     """As `_learn`, with a checkpoint now and then, and at the end a last one and the picture."""
@@ -98,11 +102,14 @@ def _learn_and_keep(
             folder.append(record)
             if record.episode % config.save_every == 0:
                 writer.save(run)
+                on_checkpoint(run.agent.online, record.episode)
 
         finished = _learn(run, [keep, *listeners], should_stop)
         writer.save(run)
+        on_checkpoint(run.agent.online, run.history[-1].episode)
         if finished:
-            picture = pictures.learning_curve(run.history, config.environment, _levels(config))
+            maps = beside_optimum(run.agent.online, config)
+            picture = pictures.finished_run(run.history, config.environment, _levels(config), maps)
             write_atomically(folder.picture, picture)
     return finished
 
@@ -128,6 +135,6 @@ def _levels(config: Config) -> dict[str, float]:
         return {}  # they would not be of the same steps
     levels = {}
     if config.gravity is not None:
-        levels["best possible"] = float(optimal_return(config.gravity, range(1000)).mean())
+        levels["best possible"] = float(optimal_return(config.gravity, USUAL_SEEDS).mean())
     levels["random actions"] = random_return(config.environment, config.gravity)
     return levels

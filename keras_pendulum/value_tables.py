@@ -1,9 +1,9 @@
 """V, the best sum of rewards that the pendulum can still collect, by dynamic programming.
 
-Backward in time (Bellman 1957, chapter III), with the 41 torques as actions and no discount: V is
-0 after the last step, and one step earlier
+Backward in time (Bellman 1957, chapter III), with the 41 torques as actions: V is 0 after the last
+step, and one step earlier
 
-    V(θ, θ̇) = -(θ² + 0.1 θ̇²) + max over u of [-0.001 u² + V(θ + dt·w, w)],
+    V(θ, θ̇) = -(θ² + 0.1 θ̇²) + max over u of [-0.001 u² + γ V(θ + dt·w, w)],
     w = clip(θ̇ + dt·(1.5 g sin θ + 3 u), -8, 8),
 
 which are the reward and the dynamics of Gymnasium's `Pendulum-v1`. V stands on a grid with
@@ -33,13 +33,18 @@ STRIP = 64  # columns backed up at a time: what stays in the processor's own mem
 
 
 def solve(
-    gravity: float, horizon: int = STEPS_PER_EPISODE, theta_cells: int = FINE_CELLS
+    gravity: float,
+    horizon: int = STEPS_PER_EPISODE,
+    theta_cells: int = FINE_CELLS,
+    discount: float = 1.0,
 ) -> NDArray[np.float32]:
     """V with `horizon` steps to go: one table of `value_tables`."""
-    return next(itertools.islice(value_tables(gravity, theta_cells), horizon, None))
+    return next(itertools.islice(value_tables(gravity, theta_cells, discount), horizon, None))
 
 
-def value_tables(gravity: float, theta_cells: int) -> Iterator[NDArray[np.float32]]:
+def value_tables(
+    gravity: float, theta_cells: int, discount: float = 1.0
+) -> Iterator[NDArray[np.float32]]:
     """V with 0, 1, 2, … steps to go, without end: the best sum of the rewards to come.
 
     Three properties make it fast. (1) All successors of a state lie on the line (θ + dt·w, w), so
@@ -50,6 +55,7 @@ def value_tables(gravity: float, theta_cells: int) -> Iterator[NDArray[np.float3
     Args:
         gravity: g in m/s².
         theta_cells: cells in [-π, 0], 10 or more.
+        discount: γ; 1 for the return of an episode.
 
     Yields:
         [3201, theta_cells + 1]: rows are θ̇ from -8 to 8 rad/s, columns θ from -π to 0 rad.
@@ -106,7 +112,7 @@ def value_tables(gravity: float, theta_cells: int) -> Iterator[NDArray[np.float3
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         while True:
             yield value
-            mirrored = _mirrored(value, margin)
+            mirrored = _mirrored(np.float32(discount) * value, margin)
             list(pool.map(shift_in_theta, groups))
             on_line[:pad] = on_line[pad]  # beyond ±8 rad/s the speed is clipped
             on_line[-pad:] = on_line[-pad - 1]

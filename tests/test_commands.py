@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import pty
 import re
+import shlex
 import signal
 import subprocess
 import sys
+import termios
 from pathlib import Path
 
+import pandas
 import pytest
+import tensorflow as tf
 from conftest import DATA, Command, command_line
 from PIL import Image, ImageSequence
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import keras_pendulum as kp
 from keras_pendulum import evaluate, train
@@ -84,6 +90,7 @@ def test_train_prints_a_line_an_episode_and_says_how_good_it_is(
 
 def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     controller, terminal = pty.openpty()
+    termios.tcsetwinsize(terminal, (24, 80))
     arguments = ["--preset", "original", "--episodes", "43", "--hidden-units", "8"]
     with subprocess.Popen(
         command_line("train", *arguments), cwd=tmp_path, stdout=terminal, close_fds=True
@@ -97,14 +104,73 @@ def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
             pass
     os.close(controller)
     assert process.returncode == 0
-    text = output.decode()
-    assert "43/43" in text
-    assert "return: " in text
-    assert "loss: " in text
-    assert re.search(r"\d[mu]?s/episode", text)
-    assert "epsilon: " in text
-    assert "Episode: " not in text
-    assert "Regret: " in text
+    bars, *closing = output.decode().replace("\r\n", "\n").split("\n")
+    shown = bars.replace("\x1b[K", "").split("\r")[1:]
+    assert all(len(line) < 80 for line in shown)  # else it wraps, and is not drawn over
+    number = r"-?[\d.e-]+"
+    assert re.fullmatch(
+        rf"43/43 ━+ return {number} regret {number} ε 0.58 loss {number} \d+ steps/s 0:00 left",
+        shown[-1],
+    )
+    assert "Episode: " not in output.decode()
+    assert "Regret: " in "\n".join(closing)
+    # Every following command that is offered is one that works.
+    offered = [line.split(": ", 1)[1] for line in closing if ": python -m" in line]
+    assert [line.split()[2] for line in offered] == [
+        f"keras_pendulum.{name}" for name in ("evaluate", "play", "page")
+    ]
+    assert all(shlex.split(line)[-1].endswith(".h5") or "render" in line for line in offered)
+
+
+def test_a_quiet_run_prints_the_closing_lines_alone(command: Command) -> None:
+    done = command("train", "--preset", "original", "--episodes", "2", "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("Trained 2 episodes")
+    assert "Regret: " in done.stdout
+
+
+def test_the_history_opens_in_pandas(command: Command, tmp_path: Path) -> None:
+    done = command("train", "--preset", "original", "--episodes", "42", "--quiet", "--out", "run")
+    assert done.returncode == 0, done.stderr
+    table = pandas.read_csv(tmp_path / "run" / "history.csv")
+    assert list(table.episode) == list(range(42))
+    assert table["return"].between(-2000, 0).all()
+    assert table.loss.isna().sum() == 41
+    assert {kind.kind for kind in table.dtypes} == {"i", "f"}
+
+
+def test_tensorboard_gets_curves_and_maps(command: Command, tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--out", "run", "--tensorboard"]
+    for episodes, more in ((43, ()), (52, ["--resume"])):
+        done = command("train", *words, "--episodes", str(episodes), *more)
+        assert done.returncode == 0, done.stderr
+    events = EventAccumulator(str(tmp_path / "run" / "tensorboard"), {"tensors": 0})
+    events.Reload()
+    with open(tmp_path / "run" / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for name, column in (("return", "return"), ("epsilon", "epsilon"), ("loss", "loss")):
+        logged = {
+            event.step: float(tf.make_ndarray(event.tensor_proto)) for event in events.Tensors(name)
+        }
+        wanted = {int(row["episode"]): float(row[column]) for row in rows if row[column]}
+        assert logged == pytest.approx(wanted, rel=1e-6)
+    maps = {event.step: event.tensor_proto.string_val for event in events.Tensors("phase plane")}
+    assert list(maps) == [0, 42, 50, 51]
+    assert tf.io.decode_png(maps[51][2]).shape == (650, 900, 4)
+    done = command("train", *words[:-1], "--episodes", "2", "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "run" / "tensorboard").exists()  # no curves of another run
+
+
+def test_a_missing_tensorboard_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert train.main(["--tensorboard", "--out", str(tmp_path / "run")]) == 2
+    assert capsys.readouterr().err == (
+        "error: tensorboard is not installed: pip install tensorboard\n"
+    )
+    assert not (tmp_path / "run").exists()
 
 
 def test_evaluate_tells_the_same_as_the_library_and_twice_the_same(command: Command) -> None:

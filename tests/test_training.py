@@ -279,11 +279,11 @@ def test_the_picture_shows_the_best_possible_above_chance(
 ) -> None:
     drawn: list[tuple[float, float]] = []
 
-    def draw(history: object, environment: str, returns: dict[str, float]) -> bytes:
+    def draw(history: Any, environment: str, returns: dict[str, float], planes: Any) -> bytes:
         drawn.append((returns["best possible"], returns["random actions"]))
         return b"a picture"
 
-    monkeypatch.setattr("keras_pendulum.pictures.learning_curve", draw)
+    monkeypatch.setattr("keras_pendulum.pictures.finished_run", draw)
     kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
     assert (tmp_path / "rewards.png").read_bytes() == b"a picture"
     assert len(drawn) == 1
