@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import mmap
 import os
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -16,6 +17,7 @@ from typing import Any, BinaryIO
 import h5py
 
 from keras_pendulum.errors import WeightsError
+from keras_pendulum.object_header import text_lengths
 
 _MOST_ENTRIES = 1000  # groups and arrays; a checkpoint has about 60
 _DEEPEST = 10  # groups inside groups; Keras 3 goes down to 4
@@ -59,6 +61,7 @@ def check(file: h5py.File, path: str | os.PathLike[str]) -> None:
         if count > _MOST_ENTRIES:
             raise WeightsError(f"{path}: holds more than {_MOST_ENTRIES} groups and arrays")
         _check_attributes(entry, size, path)
+        _check_texts(entry, path)
         if isinstance(entry, h5py.Dataset):
             _check_array(entry, path)
             stored += _bytes_in(entry)
@@ -113,11 +116,30 @@ def _check_attributes(entry: Any, size: int, path: str | os.PathLike[str]) -> No
         raise WeightsError(f"{path}: {entry.name} has {len(entry.attrs)} attributes")
     for name in entry.attrs:
         attribute = entry.attrs.get_id(name)
-        text = h5py.check_string_dtype(attribute.dtype)
-        variable = text is not None and text.length is None
+        variable = _is_text(attribute)
         if math.prod(attribute.shape) * attribute.dtype.itemsize > _LARGEST_ATTRIBUTE:
             raise WeightsError(f"{path}: {entry.name} has a huge attribute, {name}")
         if variable and size > _LARGEST_FILE_WITH_TEXTS:
             raise WeightsError(f"{path}: {entry.name} has a text of no fixed length, {name}")
         if not variable and attribute.dtype.kind not in "fiubS":
             raise WeightsError(f"{path}: {entry.name} has an attribute {name} of no plain type")
+
+
+def _check_texts(entry: Any, path: str | os.PathLike[str]) -> None:
+    """Raises WeightsError when the entry's texts of variable length claim to be large."""
+    attributes = map(entry.attrs.get_id, entry.attrs)
+    texts = sum(math.prod(each.shape) for each in attributes if _is_text(each))
+    if texts:
+        try:
+            with open(path, "rb") as file:
+                lengths = list(text_lengths(file, h5py.h5o.get_info(entry.id).addr))
+        except (ValueError, struct.error):
+            lengths = []
+        if len(lengths) != texts or sum(lengths) > _LARGEST_ATTRIBUTE:
+            raise WeightsError(f"{path}: the texts beside {entry.name} are damaged or huge")
+
+
+def _is_text(attribute: Any) -> bool:
+    """Whether it holds texts of variable length."""
+    text = h5py.check_string_dtype(attribute.dtype)
+    return text is not None and text.length is None

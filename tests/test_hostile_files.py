@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -197,3 +198,23 @@ def test_a_heap_of_texts_that_never_ends_is_refused(tmp_path: Path) -> None:
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 2
     assert "its texts cannot be read" in done.stderr
+
+
+@pytest.mark.parametrize("claimed", [2**32 - 1, 2**31, 100_000])
+def test_a_text_that_claims_gigabytes_is_refused_before_hdf5_sets_them_aside(
+    claimed: int, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.weights.h5"
+    kp.DQN((16, 8), 5).save_weights(path)
+    content = path.read_bytes()
+    heap = content.index(b"GCOL").to_bytes(8, "little")
+    # As attributes point to their texts: a length, and the heap.
+    changed, count = re.subn(
+        rb"[\x01-\x20]\0\0\0(?=" + re.escape(heap) + rb")",
+        lambda match: claimed.to_bytes(4, "little"),
+        content,
+    )
+    assert count >= 3
+    path.write_bytes(changed)
+    with pytest.raises(kp.WeightsError, match=r"the texts beside /\S+ are damaged or huge"):
+        kp.load_weights(path)

@@ -407,6 +407,27 @@ def test_what_is_not_finite_stops_the_run_at_its_step_and_keeps_the_last_checkpo
     assert len(load_checkpoint(RunFolder(tmp_path).weights, config).history) == 3
 
 
+@pytest.mark.parametrize("name", ["original", "walkthrough", "reference"])
+def test_only_finite_torques_within_the_limits_reach_the_environment(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torques = []
+    step = TimeLimit.step
+
+    def recording(env: Any, action: Any) -> Any:
+        torques.append(action.copy())
+        return step(env, action)
+
+    monkeypatch.setattr(TimeLimit, "step", recording)
+    network = kp.train_dqn(kp.preset(name, episodes=3, hidden_units=(8,))).network
+    network.head.bias.assign(np.full(41, np.nan))  # also of values that are none
+    kp.evaluate_policy(network, 1)
+    sent = np.array(torques)
+    assert sent.shape == (800, 1)
+    assert (np.abs(sent) <= 2).all()
+    assert len(np.unique(sent)) > 20
+
+
 @pytest.mark.parametrize("part", ["online", "target", "optimizer"])
 def test_what_is_not_finite_is_not_saved(part: str, tmp_path: Path) -> None:
     run = Run(kp.preset("reference", hidden_units=(8,)))
