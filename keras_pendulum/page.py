@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from keras_pendulum.network import DQN
 
 _WEB = Path(__file__).parent / "web"
-_HEAD = b"<!doctype html>\n<!-- keras_pendulum page:"  # how a page of ours begins, and no other file
+_HEAD = (
+    b"<!doctype html>\n<!-- keras_pendulum page:"  # how a page of ours begins, and no other file
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -71,8 +73,8 @@ def _write(arguments: argparse.Namespace) -> int:
 def page_of(network: DQN, path: Path, gravity: float | None = None) -> bytes:
     """The page as one HTML file, driven by `network`, which was loaded from `path`.
 
-    `gravity` in m/s²; None takes the network's own, or 1 where that is not known. Raises ConfigError
-    for one that no run can have, and UserError for a network that does not drive the pendulum.
+    `gravity` in m/s²; None takes the network's own, or 1 where that is not known. Raises
+    ConfigError for one that no run can have, UserError for a network that drives no pendulum.
     """
     from keras_pendulum.config import checked_setting
     from keras_pendulum.environment import TASKS

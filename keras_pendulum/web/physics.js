@@ -82,7 +82,7 @@ class Episode {
 
 /** The greedy torque over the phase plane, computed a little at a time, coarse cells first. */
 class TorqueMap {
-  constructor(network, size = 81) {
+  constructor(network, size = 97) {
     this.network = network;
     this.size = size; // θ from -π to π by columns, θ̇ from 8 to -8 by rows, ends included
     this.torques = new Float32Array(size * size);

@@ -1,0 +1,662 @@
+"""The page to play in a browser: used in a real one, as a person does, and held to Gymnasium."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+import webbrowser
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import DATA, Command
+from numpy.typing import NDArray
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.remote.webelement import WebElement
+
+import keras_pendulum as kp
+from keras_pendulum import page
+from keras_pendulum.environment import make_environment
+from keras_pendulum.network import Origin
+from keras_pendulum.policy import GreedyPolicy
+from keras_pendulum.torque import TorqueGrid
+
+TOLERANCE = 1e-4
+# Values as close as this may be ordered either way by the last digit of a sum.
+TIE = 1e-5
+RECORDED = DATA / "pendulum_weight.keras2.h5"
+WEB = Path(page.__file__).parent / "web"
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Weights files by name: two shipped ones, and a small one that is different in everything."""
+    small = kp.DQN((24, 7), 16, activation="relu", origin=Origin(gravity=3.5, preset="mine"))
+    random = np.random.RandomState(0)
+    small.set_weights([random.normal(size=w.shape) for w in small.get_weights()])
+    path = tmp_path_factory.mktemp("files") / "<!--<script>&.h5"  # a name as bad as names can be
+    kp.save_weights(small, path)
+    return {
+        "reference": kp.find_weights("reference"),
+        "swingup": kp.find_weights("swingup"),
+        "small": path,
+    }
+
+
+@pytest.fixture(scope="module")
+def pages(files: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Their pages' addresses."""
+    folder = tmp_path_factory.mktemp("pages")
+    for name, path in files.items():
+        assert page.main([str(path), "--out", str(folder / f"{name}.html")]) == 0
+    return {name: (folder / f"{name}.html").as_uri() for name in files}
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[webdriver.Chrome]:
+    """A browser without a window."""
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    control = shutil.which("chromedriver")
+    if not (browser and control):
+        reason = "no Chromium with its chromedriver here: install chromium and chromium-driver"
+        if os.environ.get("CI"):
+            pytest.fail(reason, pytrace=False)
+        pytest.skip(reason)
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser
+    # Without its sandbox, which does not work for root; it opens nothing but our own files.
+    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu"):
+        options.add_argument(word)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    # With the driver's path Selenium looks for none on the network.
+    driver = webdriver.Chrome(options, Service(control))
+    yield driver
+    driver.quit()
+
+
+class Player:
+    """A person in front of the page."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def screen(self, width: int, height: int, **media: str) -> None:
+        """Another screen, and other wishes of its owner."""
+        phone = width < 600
+        size = {"width": width, "height": height, "deviceScaleFactor": 1 + phone, "mobile": phone}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        features = [{"name": f"prefers-{key}", "value": value} for key, value in media.items()]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+    def open(self, address: str) -> None:
+        self.driver.get(address)
+
+    def find(self, id: str) -> WebElement:
+        return self.driver.find_element(By.ID, id)
+
+    def text(self, id: str) -> str:
+        return self.find(id).text
+
+    def button(self, torque: int) -> WebElement:
+        return self.driver.find_element(By.CSS_SELECTOR, f'[data-torque="{torque}"]')
+
+    def press(self, *keys: str) -> None:
+        """Types, whatever has the focus."""
+        ActionChains(self.driver, duration=0).send_keys(*keys).perform()
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        return self.driver.execute_script(script, *arguments)
+
+    def state(self) -> dict[str, Any]:
+        state: dict[str, Any] = self.run("return pendulum.state()")
+        return state
+
+    def focus(self) -> str:
+        """What has the keyboard: its id, or its torque."""
+        return str(self.run("const e = document.activeElement; return e.id || e.dataset.torque"))
+
+    def log(self, kind: str) -> list[dict[str, Any]]:
+        """What the browser has noted since the last time."""
+        notes: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
+        return notes
+
+    def wait(self, condition: Callable[[], bool], seconds: float = 10) -> None:
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, "it did not happen"
+            time.sleep(0.02)
+
+    def picture(self, id: str) -> NDArray[np.uint8]:
+        """A canvas as pixels [rows, columns, RGBA], drawn as things are now."""
+        self.run("pendulum.page.changed = true")
+        self.wait(lambda: not self.run("return pendulum.page.changed"))
+        width, pixels = self.run(
+            "const c = document.getElementById(arguments[0]);"
+            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+            "let s = ''; for (let i = 0; i < d.length; i += 8192)"
+            "  s += String.fromCharCode(...d.subarray(i, i + 8192)); return [c.width, s]",
+            id,
+        )
+        flat = np.frombuffer(pixels.encode("latin-1"), np.uint8)
+        return flat.reshape(-1, width, 4)
+
+
+@pytest.fixture
+def player(chromium: webdriver.Chrome) -> Iterator[Player]:
+    """A person at a computer; at the end the browser must have had nothing to complain of."""
+    player = Player(chromium)
+    player.screen(1280, 800)
+    player.log("browser")
+    player.log("performance")
+    yield player
+    assert player.log("browser") == []
+
+
+@pytest.mark.parametrize(("name", "gravity"), [("reference", 1), ("swingup", 10), ("small", 3.5)])
+def test_200_steps_agree_with_gymnasium_and_keras(
+    name: str, gravity: float, files: dict[str, Path], pages: dict[str, str], player: Player
+) -> None:
+    network = kp.load_weights(files[name])
+    policy, grid = GreedyPolicy(network), TorqueGrid(network.action_count)
+    env = make_environment("Pendulum-v1", float(gravity))
+    player.open(pages[name])
+    player.press(Keys.SPACE)
+    ties = 0
+    for seed in range(6):
+        observation, _ = env.reset(seed=seed)
+        pendulum: Any = env.unwrapped
+        rows = player.run(
+            "pendulum.reset(arguments[0], arguments[1]);"
+            "return Array.from({length: 200}, () => {"
+            "  const {qValues} = pendulum.state(); pendulum.step();"
+            "  return {...pendulum.state(), qValues}; })",
+            *pendulum.state.tolist(),
+        )
+        total, observations = 0.0, []
+        for step, row in enumerate(rows):
+            observations.append(observation)
+            q = policy.q_values(observation)
+            np.testing.assert_allclose(row["qValues"], q, rtol=0, atol=TOLERANCE)
+            action = int(q.argmax())
+            theirs = grid.nearest_index(row["torque"])
+            if theirs != action and q[action] - q[theirs] < TIE:
+                action, ties = theirs, ties + 1
+            observation, reward, _, over, _ = env.step(grid.control(action))
+            total += float(reward)
+            found = [row[key] for key in ("theta", "thetadot", "torque", "reward", "return")]
+            expected = [*pendulum.state, grid.torques[action], reward, total]
+            np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE)
+            assert (row["steps"], row["over"]) == (step + 1, over)
+        keras = network(np.array(observations)).numpy()
+        found = [row["qValues"] for row in rows]
+        np.testing.assert_allclose(found, keras, rtol=0, atol=TOLERANCE)
+        assert player.run("return pendulum.state().over")
+    assert ties <= 2
+
+
+def test_torques_typed_by_a_person_do_what_they_do_in_gymnasium(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    env = make_environment("Pendulum-v1", 3.5)
+    env.reset(seed=5)
+    pendulum: Any = env.unwrapped
+    player.run("pendulum.reset(arguments[0], arguments[1])", *pendulum.state.tolist())
+    fastest = 0.0
+    for key, torque, steps in (
+        ("j", -2, 30),
+        ("l", 2, 20),
+        ("k", 0, 5),
+        (Keys.ARROW_RIGHT, 2, 60),
+        (Keys.ARROW_DOWN, 0, 5),
+        (Keys.ARROW_LEFT, -2, 20),
+        (Keys.ARROW_UP, 0, 5),
+    ):
+        player.press(key, "s" * steps)
+        for _ in range(steps):
+            _, reward, _, _, _ = env.step(np.array([float(torque)]))
+            fastest = max(fastest, abs(pendulum.state[1]))
+        state = player.state()
+        found = [state[name] for name in ("theta", "thetadot", "torque", "reward")]
+        np.testing.assert_allclose(found, [*pendulum.state, torque, reward], atol=TOLERANCE)
+        assert player.text("torque") == f"{torque:+.2f}".replace("-", "−").replace("+0", "0")
+    assert state["steps"] == 145
+    assert fastest == 8  # the limit was met
+
+
+def test_the_switch_takes_over_and_the_torque_stays_until_another_is_chosen(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    switch = player.find("take-over")
+    assert (switch.aria_role, switch.get_attribute("aria-checked")) == ("switch", "false")
+    assert player.text("status") == "The network drives."
+    switch.click()
+    assert switch.get_attribute("aria-checked") == "true"
+    assert player.text("status") == "You drive."
+    assert player.button(0).get_attribute("aria-pressed") == "true"
+    player.press("j")
+    start = player.state()["steps"]
+    player.wait(lambda: player.state()["steps"] > start + 5)
+    assert player.state()["torque"] == -2
+    assert player.text("torque") == "−2.00"
+    assert player.button(-2).get_attribute("aria-pressed") == "true"
+    assert player.button(0).get_attribute("aria-pressed") == "false"
+    player.button(2).click()
+    player.wait(lambda: player.state()["torque"] == 2)
+    player.press("t")
+    assert player.text("status") == "The network drives."
+    assert player.button(2).get_attribute("aria-pressed") == "false"
+    player.press(Keys.SPACE)
+    best = player.run("return pendulum.page.episode.network.torques[pendulum.state().best]")
+    player.press("s")
+    assert player.state()["torque"] == best
+
+
+def test_a_finger_on_a_torque_takes_over_at_once(pages: dict[str, str], player: Player) -> None:
+    player.screen(390, 844)
+    player.open(pages["small"])
+    finger = ActionChains(player.driver, duration=0)
+    finger.move_to_element(player.button(-2)).click_and_hold().perform()
+    assert player.text("status") == "You drive."
+    assert player.button(-2).get_attribute("aria-pressed") == "true"
+    finger.release().perform()
+    player.wait(lambda: player.state()["torque"] == -2)
+
+
+def test_time_runs_as_it_should_and_stops_and_restarts(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    count = "return [pendulum.state().steps, performance.now()]"
+    player.press("r")
+    player.wait(lambda: player.state()["steps"] > 0)
+    first, start = player.run(count)
+    player.wait(lambda: player.state()["steps"] >= first + 20)
+    last, end = player.run(count)
+    assert (last - first) / (end - start) == pytest.approx(20 / 1000, rel=0.15)
+    player.find("pause").click()
+    assert player.text("status") == "Paused. The network drives."
+    assert player.text("pause").startswith("Play")
+    still = player.state()["steps"]
+    time.sleep(0.3)
+    assert player.state()["steps"] == still
+    player.find("one-step").click()
+    assert player.state()["steps"] == still + 1
+    player.find("restart").click()
+    player.wait(lambda: player.text("step") == "0 / 200")
+    assert player.text("return") == "0.0"
+    player.press(Keys.SPACE)  # the mouse has left no button behind that would take it
+    player.wait(lambda: player.state()["steps"] > 3)
+
+
+def test_a_new_random_start_follows_the_last_step(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(1, 0); for (let i = 0; i < 199; i++) pendulum.step()")
+    player.press("t", "s")
+    player.wait(lambda: player.text("step") == "200 / 200")
+    total = player.state()["return"]
+    shown = f"{total:.1f}".replace("-", "−")
+    player.wait(lambda: player.text("last-return") == shown)
+    assert player.text("last-driver") == "driven by network and you"
+    starts = []
+    for _ in range(20):
+        player.run("pendulum.reset(); for (let i = 0; i < 200; i++) pendulum.step()")
+        player.press("s")
+        starts.append(player.state())
+    assert {start["steps"] for start in starts} == {0}
+    angles = [start["theta"] for start in starts]
+    speeds = [start["thetadot"] for start in starts]
+    assert -np.pi <= min(angles) < -1 < 1 < max(angles) <= np.pi
+    assert -1 <= min(speeds) < -0.3 < 0.3 < max(speeds) <= 1
+
+
+def test_the_keyboard_reaches_everything_in_order_and_shows_where_it_is(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    order = []
+    for _ in range(7):
+        player.press(Keys.TAB)
+        order.append(player.focus())
+        outline = "getComputedStyle(document.activeElement).outline"
+        assert "solid 3px" in player.run(f"return {outline}")
+    assert order == ["take-over", "-2", "0", "2", "pause", "one-step", "restart"]
+    player.press(Keys.SPACE)  # the button's own key, not the pause
+    assert player.text("status") == "The network drives."
+    assert player.focus() == "restart"
+    player.find("take-over").send_keys(Keys.ENTER)
+    assert player.text("status") == "You drive."
+    player.button(2).send_keys(Keys.SPACE)
+    player.wait(lambda: player.state()["torque"] == 2)
+    keys = ActionChains(player.driver, duration=0)
+    keys.key_down(Keys.CONTROL).send_keys("j").key_up(Keys.CONTROL).perform()
+    assert player.button(2).get_attribute("aria-pressed") == "true"  # the browser's own shortcut
+
+
+def test_nothing_is_asked_of_any_network(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.wait(lambda: player.run("return pendulum.page.map.ready"))
+    assert player.run("return performance.getEntriesByType('resource').length") == 0
+    log = "".join(entry["message"] for entry in player.log("performance"))
+    asked = re.findall(r'"method":"Network.requestWillBeSent".*?"url":"(.*?)"', log)
+    assert asked == [pages["small"]]
+    assert "http" not in re.sub(r'"http-equiv"|http-equiv=', "", source()).lower()
+
+
+def source() -> str:
+    return "".join(path.read_text(encoding="utf-8") for path in WEB.iterdir())
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_narrow_phone_shows_everything_without_scrolling_sideways(
+    theme: str, pages: dict[str, str], player: Player
+) -> None:
+    player.screen(360, 740, **{"color-scheme": theme})
+    player.open(pages["swingup"])
+    player.run("pendulum.reset(-3.01, -7.99)")
+    player.run("for (let i = 0; i < 200; i++) pendulum.step()")  # a last episode, four digits
+    player.press(Keys.SPACE)
+    player.wait(lambda: player.text("last-driver") != "")
+    assert player.run("return document.documentElement.scrollWidth") == 360
+    cut = player.run(
+        "return [...document.querySelectorAll('main *')].filter(e => e.localName !== 'canvas' &&"
+        "  (e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== 'inline' ||"
+        "   e.getBoundingClientRect().right > 360)).map(e => e.outerHTML)"
+    )
+    assert cut == []
+    heights = player.run(
+        "return [...document.querySelectorAll('button')].map(e => e.getBoundingClientRect().height)"
+    )
+    assert min(heights) >= 44  # px, what a finger needs
+    dark = player.run("return getComputedStyle(document.body).backgroundColor") == "rgb(15, 19, 25)"
+    assert dark == (theme == "dark")
+    widths = player.run(
+        "return [...document.querySelectorAll('canvas')].map(c => [c.width, c.clientWidth])"
+    )
+    assert all(pixels == 2 * width for pixels, width in widths)  # as sharp as the screen
+
+
+def test_light_and_dark_have_enough_contrast() -> None:
+    text = (WEB / "pendulum.css").read_text(encoding="utf-8")
+    light, dark = (
+        dict(re.findall(r"--(\w+): (#\w{6})", block))
+        for block in re.findall(r":root {(.*?)}", text, re.S)
+    )
+    assert light.keys() == dark.keys()
+    for colours in (light, dark):
+        for ink in ("ink", "soft", "accent", "problem"):
+            for ground in ("card", "paper"):
+                assert contrast(colours[ink], colours[ground]) >= 4.5  # WCAG 2.2, level AA
+        for mark in ("minus", "plus", "rod"):
+            assert contrast(colours[mark], colours["card"]) >= 3
+
+
+def contrast(one: str, other: str) -> float:
+    """The contrast ratio of two colours, #rrggbb (WCAG 2.2)."""
+    darker, lighter = sorted(
+        float(
+            np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+            @ [0.2126, 0.7152, 0.0722]
+        )
+        for c in (np.frombuffer(bytes.fromhex(x[1:]), np.uint8) / 255 for x in (one, other))
+    )
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def test_whoever_wants_little_motion_starts_with_a_still_page(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.screen(1280, 800, **{"reduced-motion": "reduce"})
+    player.open(pages["small"])
+    assert player.text("status") == "Paused. The network drives."
+    assert player.state()["steps"] == 0
+    player.press(Keys.SPACE)
+    player.wait(lambda: player.state()["steps"] > 2)
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.8, -2.0, 3.0])
+def test_the_pendulum_points_where_gymnasium_draws_it(
+    theta: float, pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(arguments[0], 0)", theta)
+    rod = pixels_of(player, "pendulum", "rod")
+    env: Any = make_environment("Pendulum-v1", 1.0, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.unwrapped.state = np.array([theta, 0.0])
+    theirs = (env.render() == [204, 77, 77]).all(axis=-1)
+    env.close()
+    assert direction(rod) == pytest.approx(direction(theirs), abs=0.05)
+
+
+def pixels_of(player: Player, canvas: str, colour: str) -> NDArray[np.bool_]:
+    """Where a canvas has a colour of the style sheet."""
+    hexadecimal = player.run(f"return pendulum.page.colours.{colour}")
+    found = player.picture(canvas)[..., :3] == list(bytes.fromhex(hexadecimal[1:]))
+    return np.asarray(found.all(axis=-1))
+
+
+def direction(mask: NDArray[np.bool_]) -> complex:
+    """From the middle of a picture to the middle of what is marked in it, of length 1."""
+    rows, columns = np.nonzero(mask)
+    middle = complex(columns.mean() - mask.shape[1] / 2, mask.shape[0] / 2 - rows.mean())
+    return middle / abs(middle)
+
+
+@pytest.mark.parametrize(("key", "side"), [("l", 1), ("j", -1)])
+def test_the_arrow_of_a_positive_torque_turns_counter_clockwise(
+    key: str, side: int, pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(0, 0)")
+    player.press(key, "s")
+    arrow = pixels_of(player, "pendulum", "plus" if side > 0 else "minus")
+    # It runs below the pivot, so its wide head lies to the right when it turns counter-clockwise.
+    columns = np.nonzero(arrow)[1] - arrow.shape[1] / 2
+    assert side * columns.mean() > 1
+
+
+def test_the_map_holds_the_greedy_torque_of_every_place_and_is_drawn_the_right_way_round(
+    files: dict[str, Path], pages: dict[str, str], player: Player
+) -> None:
+    network = kp.load_weights(files["small"])
+    policy, grid = GreedyPolicy(network), TorqueGrid(network.action_count)
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.wait(lambda: player.run("return pendulum.page.map.ready"))
+    size = player.run("return pendulum.page.map.size")
+    theta, thetadot = np.meshgrid(np.linspace(-np.pi, np.pi, size), np.linspace(8, -8, size))
+    observations = np.stack([np.cos(theta), np.sin(theta), thetadot], axis=-1).astype(np.float32)
+    q = policy.q_values(observations.reshape(-1, 3))
+    found = np.array(player.run("return Array.from(pendulum.page.map.torques)"))
+    taken = q[np.arange(len(q)), [grid.nearest_index(torque) for torque in found]]
+    assert (q.max(axis=1) - taken).max() < TIE
+    assert len(set(found.tolist())) > 3  # a map that is all alike would tell nothing
+
+    player.run("pendulum.reset(Math.PI, 8)")  # the path out of the way
+    picture = player.picture("portrait")[..., :3]
+    # The plot's margins in the picture.
+    left, right, top, bottom = 46, picture.shape[1] - 10, 8, picture.shape[0] - 40
+    for row, column in ((10, 10), (10, 80), (48, 30), (70, 60), (90, 20), (90, 90)):
+        place = (
+            round(top + row / (size - 1) * (bottom - top)),
+            round(left + column / (size - 1) * (right - left)),
+        )
+        torque = found.reshape(size, size)[row, column]
+        expected = player.run("return pendulum.page.colours.ofTorque(arguments[0])", torque)
+        assert picture[place].tolist() == expected
+
+
+def test_the_highest_bar_is_the_greedy_torque_and_there_is_one_for_each(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["swingup"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(2, 1)")
+    state = player.state()
+    picture = player.picture("bars")
+    left, right = 62, picture.shape[1] - 6
+    middles = left + (np.arange(41) + 0.5) * (right - left) / 41
+    tops = np.array([np.nonzero(picture[13:, round(m), 3])[0][0] for m in middles])
+    q = np.array(state["qValues"])
+    assert tops.argmin() == state["best"] == q.argmax()
+    heights = (q - q.min()) / np.ptp(q)
+    np.testing.assert_allclose(1 - tops / tops.max(), heights, atol=0.03)
+
+
+def test_a_damaged_page_says_so_in_one_line(
+    pages: dict[str, str], player: Player, tmp_path: Path
+) -> None:
+    whole = (Path(pages["small"].removeprefix("file://"))).read_text(encoding="utf-8")
+    (tmp_path / "cut.html").write_text(re.sub(r'"weights": "....', '"weights": "', whole))
+    player.open((tmp_path / "cut.html").as_uri())
+    assert re.fullmatch(
+        r"This page is damaged \(.+\): write it again with .+\.", player.text("problem")
+    )
+
+
+def test_the_page_tells_whose_network_it_is(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["reference"])
+    assert player.text("about") == (
+        "reference.h5 (preset reference): a 512-256-128 tanh network with 41 torques, on "
+        "Pendulum-v1 with g = 1 m/s². Its mean return, when evaluated: −38.94."
+    )
+    player.open(pages["small"])
+    assert player.text("about") == (
+        "<!--<script>&.h5 (preset mine): a 24-7 relu network with 16 torques, on Pendulum-v1 with "
+        "g = 3.5 m/s²."
+    )
+
+
+def test_the_command_writes_one_small_file_and_says_how_to_open_it(
+    command: Command, tmp_path: Path
+) -> None:
+    out = tmp_path / "pendulum.html"
+    assert page.main(["reference", "--out", str(out)]) == 0
+    older = out.read_bytes()
+    done = command("page", "reference", "--gravity", "10")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert out.read_bytes() != older
+    size, address = out.stat().st_size, out.resolve().as_uri()
+    assert done.stdout == f"pendulum.html: {size / 1e6:.2f} MB; open it in a browser: {address}\n"
+    assert size < 1_500_000
+    assert [file.name for file in tmp_path.iterdir()] == ["pendulum.html"]
+    text = out.read_text(encoding="utf-8")
+    assert '"gravity": 10.0, "trainedGravity": 1.0' in text
+    assert not re.search(r'(src|href)="', text)
+
+
+def test_help_comes_without_tensorflow() -> None:
+    code = (
+        "import sys\n"
+        "from keras_pendulum import page\n"
+        "try:\n"
+        "    page.main(['--help'])\n"
+        "except SystemExit as exit:\n"
+        "    assert exit.code == 0\n"
+        "heavy = {'tensorflow', 'keras', 'gymnasium', 'matplotlib', 'h5py', 'numpy'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "usage: python -m keras_pendulum.page" in done.stdout
+
+
+WRONG = [
+    ([], "the following arguments are required: WEIGHTS.h5"),
+    (["missing.h5"], "missing.h5: no such file"),
+    (["text.h5"], "text.h5: not an HDF5 file"),
+    (["n" * 300], "File name too long"),
+    (["cartpole"], "belongs to CartPole-v1; the page shows Pendulum-v1"),
+    ([RECORDED, "--gravity", "nan"], "gravity is nan"),
+    ([RECORDED, "--gravity", "heavy"], "invalid float value: 'heavy'"),
+    ([RECORDED, "--out", ""], "the name is empty"),
+    ([RECORDED, "--out", "text.h5"], "text.h5 holds something else than a page of ours"),
+    ([RECORDED, "--out", "/dev/null"], "/dev/null holds something else than a page of ours"),
+    ([RECORDED, "--out", "."], "cannot write ."),
+    ([RECORDED, "--out", "no/such/folder.html"], "cannot write no/such/folder.html"),
+    ([RECORDED, "--out", "/proc/page.html"], "cannot write /proc/page.html"),
+    ([RECORDED, "--out", "n" * 300], "File name too long"),
+    ([RECORDED, "--open"], "there is no display to open a browser on"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), WRONG, ids=lambda value: str(value)[:60])
+def test_a_mistake_gets_one_clear_line_and_exit_status_2(
+    words: list[str],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "text.h5").write_text("not weights")
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    assert one_line(words, capsys) == message or message in one_line(words, capsys)
+    assert [file.name for file in tmp_path.iterdir()] == ["text.h5"]
+    assert (tmp_path / "text.h5").read_text() == "not weights"
+
+
+def one_line(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """What a command that must fail says."""
+    try:
+        status = page.main([str(word) for word in words])
+    except SystemExit as exit:  # argparse leaves by itself
+        assert isinstance(exit.code, int)
+        status = exit.code
+    printed = capsys.readouterr()
+    assert (status, printed.out) == (2, "")
+    assert printed.err.startswith("error: ")
+    assert printed.err.count("\n") == 1
+    return printed.err
+
+
+def test_a_browser_that_is_not_there_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DISPLAY", ":0")
+
+    def none(using: str | None = None) -> None:
+        raise webbrowser.Error("could not locate runnable browser")
+
+    monkeypatch.setattr(webbrowser, "get", none)
+    told = one_line([str(RECORDED), "--open"], capsys)
+    assert told == "error: there is no browser to open the page with: leave --open out\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_open_opens_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("BROWSER", "true")
+    opened: list[str] = []
+
+    def open_browser(address: str) -> bool:
+        opened.append(address)
+        return len(opened) == 1
+
+    monkeypatch.setattr(webbrowser, "open", open_browser)
+    assert page.main([str(RECORDED), "--open"]) == 0
+    assert opened == [(tmp_path / "pendulum.html").as_uri()]
+    assert page.main([str(RECORDED), "--open"]) == 2
+    assert capsys.readouterr().err == (
+        "error: the browser did not start: open pendulum.html by hand\n"
+    )
