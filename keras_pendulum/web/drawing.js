@@ -99,10 +99,11 @@ function drawTorque(context, colours, rod, torque) {
   if (Math.abs(torque) < 0.01) return;
   const radius = rod * 0.42;
   const sign = -Math.sign(torque); // a canvas counts angles clockwise
-  const span = (Math.abs(torque) / MAX_TORQUE) * (2 / 3) * Math.PI;
+  const share = Math.abs(torque) / MAX_TORQUE;
+  const span = share * (2 / 3) * Math.PI;
   const [start, end] = [Math.PI / 2 - (sign * span) / 2, Math.PI / 2 + (sign * span) / 2];
   const colour = torque < 0 ? colours.minus : colours.plus;
-  const head = rod * 0.1;
+  const head = rod * (0.06 + 0.04 * share);
   const tip = end + (sign * head * 1.5) / radius;
   const point = (angle, distance) => [Math.cos(angle) * distance, Math.sin(angle) * distance];
   for (const [style, extra] of [[colours.card, rod * 0.035], [colour, 0]]) {

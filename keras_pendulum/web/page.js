@@ -7,16 +7,16 @@ const TRAIL = 12; // steps
 
 /** The sentence beneath the title. */
 function about({ name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn }) {
+  const from = preset && !name.startsWith(`${preset}.`) ? ` (preset ${preset})` : "";
   const told = [
-    `${name}${preset ? ` (preset ${preset})` : ""}: a ${sizes.slice(1, -1).join("-")} ${activation} ` +
-      `network with ${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
+    `${name}${from}, a ${sizes.slice(1, -1).join("-")} ${activation} network with ` +
+      `${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
   ];
   const elsewhere = trainedGravity !== null && trainedGravity !== gravity;
   if (elsewhere) told.push(`It was trained at g = ${trainedGravity} m/s².`);
   if (evaluatedReturn !== null) {
-    told.push(
-      `Its mean return${elsewhere ? " there" : ""}, when evaluated: ${shown(evaluatedReturn, 2)}.`,
-    );
+    const where = elsewhere ? " there" : "";
+    told.push(`Mean return when evaluated${where}: ${shown(evaluatedReturn, 2)}.`);
   }
   return told.join(" ");
 }
@@ -124,12 +124,12 @@ class Page {
     element("torque").textContent = shown(episode.torque, this.digits, true);
     element("reward").textContent = shown(episode.reward, 2);
     element("return").textContent = shown(episode.return, 1);
-    element("step").textContent = `${episode.steps} / ${EPISODE_STEPS}`;
+    element("step").textContent = `${episode.steps}/${EPISODE_STEPS}`;
     element("theta").textContent = shown(wrapped(episode.theta), 2, true);
     element("thetadot").textContent = shown(episode.thetadot, 2, true);
     if (episode.last) {
       element("last-return").textContent = shown(episode.last.return, 1);
-      element("last-driver").textContent = `driven by ${episode.last.driver}`;
+      element("last-driver").textContent = `by ${episode.last.driver}`;
     }
     const { qValues, best, youDrive, yourTorque } = episode;
     element("best").textContent = `${shown(torques[best], this.digits, true)} N·m`;

@@ -69,7 +69,7 @@ class Episode {
     this.path.push([this.theta, this.thetadot]);
     this.drivers.add(this.youDrive ? "you" : "network");
     if (this.steps === EPISODE_STEPS) {
-      this.last = { return: this.return, driver: [...this.drivers].sort().join(" and ") };
+      this.last = { return: this.return, driver: this.drivers.size > 1 ? "both" : [...this.drivers][0] };
     }
     this.#look();
   }
