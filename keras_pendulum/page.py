@@ -64,7 +64,7 @@ def _write(arguments: argparse.Namespace) -> int:
     page = page_of(load_weights(path), path, arguments.gravity)
     write_atomically(out, page)
     address = out.resolve().as_uri()
-    print(f"{out}: {len(page) / 1e6:.2f} MB; open it in a browser: {address}")
+    print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")
     if arguments.open and not webbrowser.open(address):
         raise UserError(f"the browser did not start: open {out} by hand")
     return 0

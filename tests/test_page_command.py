@@ -26,7 +26,7 @@ def test_the_command_writes_one_small_file_and_says_how_to_open_it(
     assert (done.returncode, done.stderr) == (0, "")
     assert out.read_bytes() != older
     size, address = out.stat().st_size, out.resolve().as_uri()
-    assert done.stdout == f"pendulum.html: {size / 1e6:.2f} MB; open it in a browser: {address}\n"
+    assert done.stdout == f"Wrote {size / 1e6:.2f} MB; open it in a browser: {address}\n"
     assert size < 1_500_000
     assert [file.name for file in tmp_path.iterdir()] == ["pendulum.html"]
     text = out.read_text(encoding="utf-8")

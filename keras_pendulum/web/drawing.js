@@ -171,7 +171,8 @@ function drawBars(canvas, colours, torques, qValues, best, taken) {
 
 /** The torque map as a picture of one pixel a cell. */
 function mapPicture(map, colours) {
-  const picture = new OffscreenCanvas(map.size, map.size);
+  const picture = document.createElement("canvas");
+  picture.width = picture.height = map.size;
   const context = picture.getContext("2d");
   const image = context.createImageData(map.size, map.size);
   map.torques.forEach((torque, i) => image.data.set([...colours.ofTorque(torque), 255], 4 * i));
