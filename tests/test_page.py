@@ -416,6 +416,12 @@ def test_the_map_holds_the_greedy_torque_of_every_place_and_is_drawn_the_right_w
     assert (q.max(axis=1) - taken).max() < TIE
     assert len(set(found.tolist())) > 3  # a map that is all alike would tell nothing
 
+    colours, ends = player.run(
+        "const {colours} = pendulum.page;"
+        "return [[-2, 0, 2].map(colours.ofTorque), [colours.minus, colours.none, colours.plus]]"
+    )
+    assert colours == [list(bytes.fromhex(end[1:])) for end in ends]  # as the legend has it
+
     player.run("pendulum.reset(Math.PI, 8)")  # the path out of the way
     picture = player.picture("portrait")[..., :3]
     # The plot's margins in the picture.
@@ -428,6 +434,25 @@ def test_the_map_holds_the_greedy_torque_of_every_place_and_is_drawn_the_right_w
         torque = found.reshape(size, size)[row, column]
         expected = player.run("return pendulum.page.colours.ofTorque(arguments[0])", torque)
         assert picture[place].tolist() == expected
+
+
+def test_the_path_runs_through_every_state_and_off_the_edge_only_where_the_pendulum_turns_over(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(2.6, 4)")
+    player.press("l", "s" * 12)
+    path = np.array(player.run("return pendulum.page.episode.path"))
+    assert path[0, 0] < np.pi < path[-1, 0]
+    drawn = pixels_of(player, "portrait", "path")
+    height, width = drawn.shape
+    columns = 46 + ((path[:, 0] + np.pi) % (2 * np.pi) / (2 * np.pi)) * (width - 56)
+    rows = 8 + (1 - path[:, 1] / 8) / 2 * (height - 48)
+    for row, column in np.rint([rows, columns]).T.astype(int):
+        assert drawn[row - 2 : row + 3, column - 2 : column + 3].any()
+    # A line across the whole picture, from one edge back to the other, would be in the middle.
+    assert not drawn[:, round(46 + (width - 56) / 2)].any()
 
 
 def test_the_highest_bar_is_the_greedy_torque_and_there_is_one_for_each(
