@@ -29,3 +29,21 @@ def write_atomically(path: str | os.PathLike[str], *parts: bytes) -> None:
             fresh.unlink(missing_ok=True)
     except OSError as error:
         raise UserError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def require_no_other_file(path: Path, beginning: bytes, kind: str) -> None:
+    """Raises UserError when `path` holds something else than a file that begins so, `kind`.
+
+    A slip of the shell's completion would else put what a command makes in place of the weights
+    that it makes it of.
+    """
+    try:
+        if path.is_file():
+            with open(path, "rb") as file:
+                other = file.read(len(beginning)) != beginning
+        else:  # a folder cannot be written either, which is told where it is tried
+            other = path.exists() and not path.is_dir()
+    except OSError as error:
+        raise UserError(f"cannot write {path}: {error.strerror}") from error
+    if other:
+        raise UserError(f"{path} holds something else than {kind}: name another file")

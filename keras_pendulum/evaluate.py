@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from keras_pendulum.atomic_file import require_no_other_file, write_atomically
 from keras_pendulum.backend import quick_import, require_tensorflow
 from keras_pendulum.command_line import OneLineParser, name, run_command
 from keras_pendulum.display import draw_without_display, require_display
-from keras_pendulum.errors import UserError
 
 if TYPE_CHECKING:
     from keras_pendulum.network import DQN
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _evaluate(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     if arguments.gif:
-        _require_no_other_file(Path(arguments.gif))
+        require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
     if arguments.render:
         require_display()
 
@@ -68,20 +68,9 @@ def _evaluate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _require_no_other_file(path: Path) -> None:
-    # A slip of the shell's completion would else put the film in place of the weights.
-    try:
-        other = path.is_file() and not path.read_bytes().startswith(b"GIF8")
-    except OSError as error:
-        raise UserError(f"cannot write {path}: {error.strerror}") from error
-    if other:
-        raise UserError(f"{path} holds something else than a GIF: name another file")
-
-
 def _film(network: DQN, seed: int, gravity: float | None, path: str) -> None:
     """Writes a GIF of the first episode, every second frame of it."""
     from keras_pendulum import pictures
-    from keras_pendulum.atomic_file import write_atomically
     from keras_pendulum.evaluation import evaluate_policy
 
     draw_without_display()

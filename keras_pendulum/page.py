@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from keras_pendulum.atomic_file import require_no_other_file, write_atomically
 from keras_pendulum.backend import quick_import, require_tensorflow
 from keras_pendulum.command_line import OneLineParser, name, run_command
 from keras_pendulum.errors import UserError
@@ -52,12 +53,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _write(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     out = Path(arguments.out)
-    _require_no_other_file(out)
+    require_no_other_file(out, _HEAD, "a page of ours")
     if arguments.open:
         _require_browser()
 
     with quick_import():
-        from keras_pendulum.atomic_file import write_atomically
         from keras_pendulum.weights import find_weights, load_weights
 
     path = find_weights(arguments.weights)
@@ -121,20 +121,6 @@ def _evaluated_return(path: Path) -> float | None:
         group = file.get("keras_pendulum")
         value = None if group is None else group.attrs.get("evaluated_return")
         return float(value) if value is not None and math.isfinite(value) else None
-
-
-def _require_no_other_file(path: Path) -> None:
-    # A slip of the shell's completion would else put the page in place of the weights.
-    try:
-        if path.is_file():
-            with open(path, "rb") as file:
-                other = file.read(len(_HEAD)) != _HEAD
-        else:  # a folder cannot be written either, which is told where it is tried
-            other = path.exists() and not path.is_dir()
-    except OSError as error:
-        raise UserError(f"cannot write {path}: {error.strerror}") from error
-    if other:
-        raise UserError(f"{path} holds something else than a page of ours: name another file")
 
 
 def _require_browser() -> None:
