@@ -14,11 +14,19 @@ from keras_pendulum.errors import UserError
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Tells a wrong flag in one line, without the usage."""
+    """Tells a wrong flag in one line, without the usage, and lets a shell complete flags."""
 
     def error(self, message: str) -> NoReturn:
         """Leaves with exit status 2."""
         self.exit(2, f"error: {message}\n")
+
+    def parse_args(self, *words: Any) -> Any:  # type: ignore[override]
+        """As argparse; where a shell asks for completions, argcomplete answers and leaves."""
+        if "_ARGCOMPLETE" in os.environ:
+            import argcomplete
+
+            argcomplete.autocomplete(self)
+        return super().parse_args(*words)
 
 
 def run_command(command: Callable[[], int]) -> int:

@@ -4,6 +4,7 @@ The page's own text lies in `web/`. Everything goes into one file, the weights a
 so that it needs neither server nor network.
 """
 
+# PYTHON_ARGCOMPLETE_OK
 from __future__ import annotations
 
 import argparse

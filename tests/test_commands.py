@@ -45,6 +45,34 @@ def test_help_comes_without_tensorflow(name: str) -> None:
     assert "usage: python -m keras_pendulum." in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("train --pres", {"--preset"}),
+        ("train --bootstrap ", {"max", "double"}),
+        ("evaluate --gi", {"--gif"}),
+        ("play --ag", {"--against"}),
+        ("page --o", {"--out", "--open"}),
+    ],
+)
+def test_a_shell_can_complete_flags(typed: str, offered: set[str], tmp_path: Path) -> None:
+    """As argcomplete's own shell functions ask for it."""
+    line = f"python -m keras_pendulum.{typed}"
+    name = typed.split()[0]
+    file = tmp_path / "completions"
+    asked = {
+        "_ARGCOMPLETE": "3",
+        "_ARGCOMPLETE_IFS": "\n",
+        "_ARGCOMPLETE_STDOUT_FILENAME": str(file),
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+    }
+    subprocess.run(command_line(name), env=os.environ | asked, capture_output=True, check=True)
+    assert {word.strip() for word in file.read_text().split("\n")} == offered
+    source = Path(kp.__file__).with_name(f"{name}.py").read_text()
+    assert "PYTHON_ARGCOMPLETE_OK" in source[:1024]  # without it the shell does not ask
+
+
 def test_every_setting_is_a_flag_with_a_help_text() -> None:
     done = subprocess.run(
         command_line("train", "--help"),
