@@ -196,13 +196,11 @@ def test_time_runs_as_it_should_and_stops_and_restarts(
     pages: dict[str, str], player: Player
 ) -> None:
     player.open(pages["small"])
-    count = "return [pendulum.state().steps, performance.now()]"
     player.press("r")
     player.wait(lambda: player.state()["steps"] > 0)
-    first, start = player.run(count)
-    player.wait(lambda: player.state()["steps"] >= first + 20)
-    last, end = player.run(count)
-    assert (last - first) / (end - start) == pytest.approx(20 / 1000, rel=0.15)
+    # A machine that is busy with other things may lose a moment.
+    rates = [steps_a_second(player) for _ in range(3)]
+    assert any(rate == pytest.approx(20, rel=0.1) for rate in rates), rates
     player.find("pause").click()
     assert player.text("status") == "Paused. The network drives."
     assert player.text("pause").startswith("Play")
@@ -216,6 +214,14 @@ def test_time_runs_as_it_should_and_stops_and_restarts(
     assert player.text("return") == "0.0"
     player.press(Keys.SPACE)  # the mouse has left no button behind that would take it
     player.wait(lambda: player.state()["steps"] > 3)
+
+
+def steps_a_second(player: Player) -> float:
+    count = "return [pendulum.state().steps, performance.now()]"
+    first, start = player.run(count)
+    player.wait(lambda: player.state()["steps"] >= first + 16)
+    last, end = player.run(count)
+    return float(1000 * (last - first) / (end - start))
 
 
 def test_a_new_random_start_follows_the_last_step(pages: dict[str, str], player: Player) -> None:
