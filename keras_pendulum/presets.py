@@ -36,11 +36,9 @@ _SWINGUP = replace(
     gravity=10.0,
     episodes=1700,
     episode_steps=60,
-    replay_capacity=100_000,
     batch_size=64,
     discount=0.98,
     reward_scale=0.02,
-    bootstrap="double",
     epsilon_decay=0.997,
     updates_per_episode=30,
 )
