@@ -14,15 +14,23 @@ def require_display() -> None:
     Without a screen SDL falls back to drawing off-screen, which shows nothing and crashes beside
     TensorFlow.
     """
-    variables = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
-    hopeless = sys.platform == "linux" and not any(map(os.environ.get, variables))
+    x, *others = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"))
+    linux = sys.platform == "linux"
+    hopeless = linux and not x and not any(others)
     if not hopeless:
+        if linux and not any(others):
+            os.environ["SDL_VIDEODRIVER"] = "x11"  # else it tries Wayland too, which complains
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         import pygame
 
         try:
             pygame.display.init()
-            hopeless = pygame.display.get_driver() == "offscreen"
+            driver = pygame.display.get_driver()
+            hopeless = driver == "offscreen"
+            if driver == "x11":
+                # SDL would put its pictures up by way of OpenGL, whose drivers may bring an LLVM
+                # that crashes beside TensorFlow's. Other systems have no other way.
+                os.environ.setdefault("SDL_FRAMEBUFFER_ACCELERATION", "0")
         except pygame.error:
             hopeless = True
     if hopeless:
