@@ -85,9 +85,8 @@ def _drive(
     from keras_pendulum.optimum import USUAL_SEEDS
 
     if seed is None:
-        seed = random.choice(
-            USUAL_SEEDS
-        )  # whose best possible returns are known, or kept once found
+        # Of these the best possible returns are known, or kept once they are found.
+        seed = random.choice(USUAL_SEEDS)
     tell = functools.partial(print, flush=True)
     game = Game(gravity, seed, agent, tell=tell, print_steps=print_steps)
     guard.before_end = lambda: game.press(Key.LEAVE)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 import resource
+import shutil
+import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
@@ -57,3 +60,36 @@ def test_a_limit_on_the_files_size_is_told_and_the_old_file_stays(tmp_path: Path
 def test_a_vanished_folder_is_told(tmp_path: Path) -> None:
     with pytest.raises(kp.UserError, match=r"cannot write .*: No such file or directory"):
         write_atomically(tmp_path / "gone" / "a.h5", b"new")
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Iterator[Path]:
+    """A folder that may be looked into, but not written in, with an old file; not even by root."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / "pendulum_weight.h5").write_bytes(b"old")
+    folder.chmod(0o555)
+    # Whoever has no rights cannot import either: everything is to be there before.
+    kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
+    user = os.geteuid()
+    if user == 0:
+        os.seteuid(65534)  # whom such a folder stops
+    try:
+        yield folder
+    finally:
+        os.seteuid(user)
+        folder.chmod(0o755)
+        shutil.rmtree(folder)
+
+
+def test_a_read_only_folder_is_told_and_the_old_file_stays(read_only: Path) -> None:
+    old = read_only / "pendulum_weight.h5"
+    config = kp.preset("original", episodes=1, hidden_units=(8,))
+    tries = {
+        "cannot write": lambda: kp.save_weights(kp.DQN((8,)), old),
+        "cannot make the folder": lambda: kp.train_dqn(config, read_only / "run"),
+        "cannot write .*pendulum": lambda: kp.train_dqn(config, read_only, overwrite=True),
+    }
+    for message, attempt in tries.items():
+        with pytest.raises(kp.UserError, match=f"{message}.*: Permission denied"):
+            attempt()
+    assert {file.name: file.read_bytes() for file in read_only.iterdir()} == {old.name: b"old"}

@@ -15,19 +15,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pygame
 import pytest
 from conftest import Command, command_line
 
 import keras_pendulum as kp
-from keras_pendulum import play
+from keras_pendulum import cockpit, play
 from keras_pendulum.driving import Drive, Policy
 from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
 from keras_pendulum.game import READY_FRAMES, Game
 from keras_pendulum.lost_window import LossGuard
-
-pygame = pytest.importorskip("pygame")
-
-from keras_pendulum import cockpit  # noqa: E402 - it imports pygame
 
 NO_SCREEN = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
 STEP = re.compile(r"Step: (\d+), Torque: (\S+), Reward: (\S+), Return: (\S+)")
@@ -46,7 +43,9 @@ class Player:
         self.frames += 1
         assert self.frames < 5000, "the game does not end"
         if self.frames in self.keys:
-            self.looks[self.frames] = pygame.surfarray.array3d(pygame.display.get_surface())
+            surface = pygame.display.get_surface()
+            assert surface is not None
+            self.looks[self.frames] = pygame.surfarray.array3d(surface)
             for key in np.atleast_1d(self.keys[self.frames]).tolist():
                 if key == pygame.QUIT:
                     pygame.event.post(pygame.event.Event(pygame.QUIT))
