@@ -80,7 +80,7 @@ def live_curve(returns: Sequence[float]) -> bytes:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8, 4.5), layout="constrained")
+    figure = Figure(figsize=(9.6, 5.4), layout="constrained")
     _draw_curve(figure.subplots(), returns, "Return", mean_over=100, levels={})
     return _png(figure)
 

@@ -8,7 +8,7 @@ import resource
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
 
@@ -84,7 +84,7 @@ def read_only(tmp_path: Path) -> Iterator[Path]:
 def test_a_read_only_folder_is_told_and_the_old_file_stays(read_only: Path) -> None:
     old = read_only / "pendulum_weight.h5"
     config = kp.preset("original", episodes=1, hidden_units=(8,))
-    tries = {
+    tries: dict[str, Callable[[], object]] = {
         "cannot write": lambda: kp.save_weights(kp.DQN((8,)), old),
         "cannot make the folder": lambda: kp.train_dqn(config, read_only / "run"),
         "cannot write .*pendulum": lambda: kp.train_dqn(config, read_only, overwrite=True),

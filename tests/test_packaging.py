@@ -103,8 +103,9 @@ def test_the_declared_dependencies_are_those_imported() -> None:
         for path in ROOT.glob("keras_pendulum/**/*.py")
         for module in imported_modules(path)
     }
-    # IPython is there wherever a notebook is, and imported nowhere else.
-    imported -= {"keras_pendulum", "IPython", *sys.stdlib_module_names}
+    # IPython is there wherever a notebook is, and imported nowhere else; argcomplete, an extra,
+    # wherever a shell asks for completions.
+    imported -= {"keras_pendulum", "IPython", "argcomplete", *sys.stdlib_module_names}
     config = configparser.ConfigParser()
     config.read(ROOT / "setup.cfg", encoding="utf-8")
     declared = re.findall(r"^[\w-]+", config["options"]["install_requires"], re.MULTILINE)

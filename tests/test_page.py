@@ -473,7 +473,8 @@ def test_the_highest_bar_is_the_greedy_torque_and_there_is_one_for_each(
     middles = left + (np.arange(41) + 0.5) * (right - left) / 41
     tops = np.array([np.nonzero(picture[13:, round(m), 3])[0][0] for m in middles])
     q = np.array(state["qValues"])
-    assert tops.argmin() == state["best"] == q.argmax()
+    assert state["best"] == q.argmax()
+    assert tops[state["best"]] == tops.min()  # others may be as high to a pixel
     heights = (q - q.min()) / np.ptp(q)
     np.testing.assert_allclose(1 - tops / tops.max(), heights, atol=0.03)
 

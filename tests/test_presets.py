@@ -112,7 +112,7 @@ def test_a_batch_larger_than_what_is_stored_at_the_first_update_is_refused() -> 
 
 def test_the_swingup_is_the_reference_on_the_standard_task() -> None:
     config = kp.preset("swingup")
-    assert (config.gravity, config.bootstrap, config.discount) == (10.0, "double", 0.98)
+    assert (config.gravity, config.bootstrap, config.discount) == (10.0, "max", 0.98)
     assert (config.hidden_units, config.torque_count) == ((512, 256, 128), 41)
 
 
