@@ -107,10 +107,10 @@ def _learn_and_keep(
         finished = _learn(run, [keep, *listeners], should_stop)
         writer.save(run)
         on_checkpoint(run.agent.online, run.history[-1].episode)
-        if finished:
-            maps = beside_optimum(run.agent.online, config)
-            picture = pictures.finished_run(run.history, config.environment, _levels(config), maps)
-            write_atomically(folder.picture, picture)
+    if finished:
+        maps = beside_optimum(run.agent.online, config)
+        picture = pictures.finished_run(run.history, config.environment, _levels(config), maps)
+        write_atomically(folder.picture, picture)
     return finished
 
 

@@ -354,7 +354,9 @@ class Screen:
     def __init__(self) -> None:
         reading, writing = os.pipe()
         self._server = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x800x24", "-nolisten", "tcp"],
+            # Without -noreset it starts anew after each client that was the only one, and refuses
+            # those who come meanwhile.
+            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x800x24", "-noreset"],
             pass_fds=[writing],
             stderr=subprocess.DEVNULL,
         )
@@ -435,7 +437,7 @@ class Playing:
 
     def wait_for(self, found: Any) -> Any:
         until = time.monotonic() + 20
-        while time.monotonic() < until:
+        while time.monotonic() < until and self.process.poll() is None:
             if value := found():
                 return value
             time.sleep(0.05)

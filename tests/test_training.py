@@ -130,12 +130,7 @@ def test_a_checkpoint_that_fails_beside_the_run_ends_it_and_the_last_good_one_st
     config = kp.preset("original", episodes=40, hidden_units=(8,))
     seen: list[Any] = []
     # The checkpoints before the first episode and of episodes 0 and 10, settings and history.
-    left = iter(range(5))
-    fsync = os.fsync
-    monkeypatch.setattr(
-        "keras_pendulum.atomic_file.os.fsync",
-        lambda file: full_disk(file) if next(left, None) is None else fsync(file),
-    )
+    fill_disk_after(5, monkeypatch)
     with pytest.raises(kp.UserError, match=r"cannot write .*No space left"):
         kp.train_dqn(config, tmp_path, listeners=[seen.append])
     assert seen[-1].episode == 29  # the checkpoint of episode 20 failed, that of 30 is told
@@ -203,6 +198,23 @@ def test_what_a_killed_run_left_half_written_goes(tmp_path: Path) -> None:
 
 def full_disk(descriptor: int) -> None:
     raise OSError(28, "No space left on device")
+
+
+def fill_disk_after(files: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    left = iter(range(files))
+    fsync = os.fsync
+    monkeypatch.setattr(
+        "keras_pendulum.atomic_file.os.fsync",
+        lambda file: full_disk(file) if next(left, None) is None else fsync(file),
+    )
+
+
+def test_a_last_checkpoint_that_fails_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill_disk_after(4, monkeypatch)
+    with pytest.raises(kp.UserError, match=r"cannot write .*pendulum_weight\.h5: No space left"):
+        kp.train_dqn(kp.preset("original", episodes=2, hidden_units=(8,)), tmp_path)
 
 
 def test_of_two_checkpoints_the_newer_one_goes_on(tmp_path: Path) -> None:
