@@ -21,6 +21,7 @@ from keras_pendulum.torque import TorqueGrid
 DATA = Path(__file__).parent / "data"
 Recorded = dict[str, NDArray[Any]]
 Command = Callable[..., subprocess.CompletedProcess[str]]
+Refusal = Callable[[Callable[[list[str]], int], Sequence[object]], str]
 
 
 @pytest.fixture(scope="session")
@@ -87,6 +88,34 @@ def command(tmp_path: Path) -> Command:
         return done
 
     return run
+
+
+@pytest.fixture
+def refusal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Refusal:
+    """The one line that a command's `main` says to words it must refuse.
+
+    It is called in a folder with a file `text.h5`, which it must leave as it is.
+    """
+    (tmp_path / "text.h5").write_text("not weights")
+    monkeypatch.chdir(tmp_path)
+
+    def told(main: Callable[[list[str]], int], words: Sequence[object]) -> str:
+        try:
+            status = main([str(word) for word in words])
+        except SystemExit as exit:  # argparse leaves by itself
+            assert isinstance(exit.code, int)
+            status = exit.code
+        printed = capsys.readouterr()
+        assert (status, printed.out) == (2, "")
+        assert printed.err.startswith("error: ")
+        assert printed.err.count("\n") == 1
+        assert [file.name for file in tmp_path.iterdir()] == ["text.h5"]
+        assert (tmp_path / "text.h5").read_text() == "not weights"
+        return printed.err
+
+    return told
 
 
 def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]:

@@ -17,7 +17,7 @@ from pathlib import Path
 import pandas
 import pytest
 import tensorflow as tf
-from conftest import DATA, Command, command_line
+from conftest import DATA, Command, Refusal, command_line
 from PIL import Image, ImageSequence
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -317,28 +317,10 @@ WRONG = [
 
 @pytest.mark.parametrize(("words", "message"), WRONG, ids=lambda value: str(value)[:60])
 def test_a_mistake_gets_one_clear_line_and_exit_status_2(
-    words: list[str],
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words: list[str], message: str, refusal: Refusal
 ) -> None:
-    (tmp_path / "text.h5").write_text("not weights")
-    monkeypatch.chdir(tmp_path)
     main = {"train": train.main, "evaluate": evaluate.main}[words[0]]
-    try:
-        status = main([str(word) for word in words[1:]])
-    except SystemExit as exit:  # argparse leaves by itself
-        assert isinstance(exit.code, int)
-        status = exit.code
-    printed = capsys.readouterr()
-    assert status == 2
-    assert printed.out == ""
-    assert printed.err.startswith("error: ")
-    assert printed.err.count("\n") == 1
-    assert message in printed.err
-    assert [file.name for file in tmp_path.iterdir()] == ["text.h5"]
-    assert (tmp_path / "text.h5").read_text() == "not weights"
+    assert message in refusal(main, words[1:])
 
 
 @pytest.mark.parametrize(

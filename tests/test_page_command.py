@@ -9,7 +9,7 @@ import webbrowser
 from pathlib import Path
 
 import pytest
-from conftest import DATA, Command
+from conftest import DATA, Command, Refusal
 
 from keras_pendulum import page
 
@@ -71,48 +71,24 @@ WRONG = [
 
 @pytest.mark.parametrize(("words", "message"), WRONG, ids=lambda value: str(value)[:60])
 def test_a_mistake_gets_one_clear_line_and_exit_status_2(
-    words: list[str],
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words: list[str], message: str, refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "text.h5").write_text("not weights")
-    monkeypatch.chdir(tmp_path)
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)
-    assert message in one_line(words, capsys)
-    assert [file.name for file in tmp_path.iterdir()] == ["text.h5"]
-    assert (tmp_path / "text.h5").read_text() == "not weights"
-
-
-def one_line(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """What a command that must fail says."""
-    try:
-        status = page.main([str(word) for word in words])
-    except SystemExit as exit:  # argparse leaves by itself
-        assert isinstance(exit.code, int)
-        status = exit.code
-    printed = capsys.readouterr()
-    assert (status, printed.out) == (2, "")
-    assert printed.err.startswith("error: ")
-    assert printed.err.count("\n") == 1
-    return printed.err
+    assert message in refusal(page.main, words)
 
 
 def test_a_browser_that_is_not_there_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("DISPLAY", ":0")
 
     def none(using: str | None = None) -> None:
         raise webbrowser.Error("could not locate runnable browser")
 
     monkeypatch.setattr(webbrowser, "get", none)
-    told = one_line([str(RECORDED), "--open"], capsys)
+    told = refusal(page.main, [RECORDED, "--open"])
     assert told == "error: there is no browser to open the page with: leave --open out\n"
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_open_opens_the_page(

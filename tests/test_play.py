@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pygame
 import pytest
-from conftest import Command, command_line
+from conftest import Command, Refusal, command_line
 
 import keras_pendulum as kp
 from keras_pendulum import cockpit, play
@@ -320,24 +320,9 @@ def test_it_starts_without_tensorflow_and_its_help_without_anything() -> None:
     ids=lambda value: str(value)[:40],
 )
 def test_a_mistake_is_told_in_one_line_before_there_is_a_window(
-    words: list[str],
-    message: str,
-    no_window: None,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words: list[str], message: str, no_window: None, refusal: Refusal
 ) -> None:
-    (tmp_path / "text.h5").write_text("not weights")
-    monkeypatch.chdir(tmp_path)
-    try:
-        status = play.main(words)
-    except SystemExit as exit:  # argparse leaves by itself
-        status = int(str(exit.code))
-    printed = capsys.readouterr()
-    assert (status, printed.out) == (2, "")
-    assert printed.err.startswith("error: ")
-    assert printed.err.count("\n") == 1
-    assert message in printed.err
+    assert message in refusal(play.main, words)
     assert not pygame.display.get_init() or pygame.display.get_surface() is None
 
 
