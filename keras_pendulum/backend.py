@@ -30,6 +30,17 @@ def prepare_environment() -> None:
         os.environ.setdefault(name, value)
 
 
+def keep_to_one_thread() -> None:
+    """Has every library of this process compute on one thread; to be called before their import.
+
+    Workers beside each other would otherwise wait for one another's threads. What the user has set
+    does not stay: the results of all workers of a study must be the same.
+    """
+    os.environ.update(_ENVIRONMENT)
+    for name in ("OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "TF_NUM_INTEROP"):
+        os.environ[f"{name}_THREADS"] = "1"
+
+
 def require_tensorflow() -> None:
     """Raises UserError when Keras was asked to run on another backend."""
     backend = os.environ["KERAS_BACKEND"]

@@ -10,7 +10,7 @@ from dataclasses import fields
 from typing import Any, NoReturn
 
 from keras_pendulum.config import Config
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import ConfigError, UserError
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -70,6 +70,25 @@ def typed_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     """The settings that were typed, by field name; the preset is not one of them."""
     names = {spec.name for spec in fields(Config)} - {"preset"}
     return {name: value for name, value in vars(arguments).items() if name in names}
+
+
+def setting_from_text(field: str, text: str) -> Any:
+    """The value of a field of Config that was typed as `field=text`.
+
+    Raises ConfigError for an unknown field, or a text that is no value of its kind; the range is
+    Config's to check.
+    """
+    spec = Config.__dataclass_fields__.get(field)
+    if spec is None:
+        raise ConfigError(f"unknown setting {field!r}")
+    kind, _, optional = str(spec.type).partition(" | ")
+    if optional and text == "none":
+        return None
+    try:
+        return _READERS[kind](text)
+    except ValueError as error:
+        expected = _READERS[kind].__name__
+        raise ConfigError(f"{field} is {text!r}; expected {expected}") from error
 
 
 def _whole_numbers(text: str) -> tuple[int, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import math
 import os
@@ -17,6 +16,7 @@ from keras_pendulum.config import Config
 from keras_pendulum.environment import TASKS
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import UserError
+from keras_pendulum.folder_lock import held
 
 _COLUMNS = ["return" if name == "episode_return" else name for name in EpisodeRecord._fields]
 
@@ -65,21 +65,8 @@ class RunFolder:
         if not self.path.is_dir():
             yield  # nothing to resume, which the checkpoint's reader tells
             return
-        descriptor = os.open(self.path, os.O_RDONLY)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            os.close(descriptor)
-            raise UserError(
-                f"another run is going on in {self.path}: wait for its end, or name another folder "
-                "by --out"
-            ) from error
-        except OSError:  # a file system without locks
-            pass
-        try:
+        with held(self.path):
             yield
-        finally:
-            os.close(descriptor)
 
     def claim(self, overwrite: bool) -> None:
         """Raises UserError when the folder holds a run already and `overwrite` is false."""

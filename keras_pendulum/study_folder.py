@@ -1,0 +1,145 @@
+"""The folder of a study: what it is, a file for each run's result, and what is still to be made."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from keras_pendulum.arms import Arm
+from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.config import Config
+from keras_pendulum.errors import UserError
+from keras_pendulum.folder_lock import held
+from keras_pendulum.study_result import Result, Task, decode, installed_versions
+from keras_pendulum.study_run import Outcome, require_versions
+
+_LOG_COLUMNS = ("arm", "seed", "worker", "training", "evaluation", "total")
+
+
+class StudyFolder:
+    """Results of the arms' runs with the seeds 0, 1, …; arms that train alike share theirs.
+
+    Args:
+        path: the folder.
+        arms: the study's.
+        seeds: how many runs of each arm are wanted.
+    """
+
+    def __init__(self, path: Path, arms: Sequence[Arm], seeds: int) -> None:
+        self.path = path
+        self.versions = installed_versions()
+        self._arms = arms
+        self._seeds = seeds
+        self._manifest = path / "study.json"
+        self._log = path / "seconds.csv"
+        self._results = path / "results"
+        self._maker: dict[Config, Arm] = {}
+        for arm in arms:
+            self._maker.setdefault(arm.training, arm)
+
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Makes the folder or goes on with it, and keeps other studies out meanwhile.
+
+        Raises UserError when it holds another study or something else, or cannot be written.
+        """
+        try:
+            self._results.mkdir(parents=True, exist_ok=True)
+            for arm in self._maker.values():
+                (self._results / arm.slug).mkdir(exist_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
+        with held(self.path):
+            if self._manifest.exists():
+                self._require_same_study()
+            else:
+                write_atomically(self._manifest, _json(self._described()))
+                write_atomically(self._log, (",".join(_LOG_COLUMNS) + "\n").encode())
+            yield
+
+    def tasks(self) -> list[Task]:
+        """Every run of the study: seed by seed, so that all arms grow alike."""
+        return [
+            Task(arm.name, arm.slug, replace(arm.config, seed=seed), self.versions)
+            for seed in range(self._seeds)
+            for arm in self._maker.values()
+        ]
+
+    def missing(self) -> list[Task]:
+        """The runs that have no sound result yet."""
+        return [task for task in self.tasks() if self._read(task) is None]
+
+    def keep(self, task: Task, outcome: Outcome) -> Result:
+        """Writes a result atomically, and what it cost to the log.
+
+        Raises UserError when it is damaged or cannot be written.
+        """
+        result = decode(outcome.result, task)
+        if result is None:
+            raise UserError(f"{outcome.worker} sent a damaged result of {task.arm}")
+        write_atomically(self._file(task), outcome.result)
+        seconds = (outcome.training, outcome.evaluation, outcome.total)
+        line = io.StringIO()
+        csv.writer(line, lineterminator="\n").writerow(
+            [task.arm, task.config.seed, outcome.worker, *(f"{value:.3f}" for value in seconds)]
+        )
+        try:
+            with open(self._log, "a", encoding="utf-8") as file:
+                file.write(line.getvalue())
+        except OSError as error:
+            raise UserError(f"cannot write {self._log}: {error.strerror}") from error
+        return result
+
+    def results(self) -> dict[str, list[Result]]:
+        """The sound results of each arm by its name, in the order of their seeds."""
+        made: dict[Config, list[Result]] = {training: [] for training in self._maker}
+        for task, training in zip(self.tasks(), [*self._maker] * self._seeds, strict=True):
+            result = self._read(task)
+            if result is not None:
+                made[training].append(result)
+        return {arm.name: made[arm.training] for arm in self._arms}
+
+    def _file(self, task: Task) -> Path:
+        return self._results / task.slug / f"{task.slug}-seed{task.config.seed}.json"
+
+    def _read(self, task: Task) -> Result | None:
+        try:
+            return decode(self._file(task).read_bytes(), task)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise UserError(f"cannot read {self._file(task)}: {error.strerror}") from error
+
+    def _described(self) -> dict[str, Any]:
+        arms = [
+            {"name": arm.name, "against": arm.against, "config": asdict(arm.config)}
+            for arm in self._arms
+        ]
+        return {"versions": self.versions, "arms": arms}
+
+    def _require_same_study(self) -> None:
+        other = UserError(
+            f"{self.path} holds another study, with other arms or settings: name another folder "
+            "by --out"
+        )
+        try:
+            there = json.loads(self._manifest.read_bytes())
+        except OSError as error:
+            raise UserError(f"cannot read {self._manifest}: {error.strerror}") from error
+        except ValueError as error:
+            raise UserError(f"{self._manifest} is damaged: name another folder by --out") from error
+        if not isinstance(there, dict) or not isinstance(there.get("versions"), dict):
+            raise other
+        require_versions(there["versions"], self.versions, f"{self.path}: this machine")
+        if there.get("arms") != json.loads(_json(self._described()))["arms"]:
+            raise other
+
+
+def _json(content: Any) -> bytes:
+    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()

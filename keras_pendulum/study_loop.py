@@ -1,0 +1,84 @@
+"""Runs handed out to workers, a bounded number at a time; one that dies is tried again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future
+from itertools import islice
+from queue import SimpleQueue
+from typing import Any, NamedTuple
+
+from keras_pendulum.errors import UserError
+from keras_pendulum.study_result import Task
+from keras_pendulum.study_run import Outcome
+
+ATTEMPTS = 3
+
+
+class Engine(NamedTuple):
+    """Where runs are made."""
+
+    executor: Executor
+    in_flight: int  # how many runs to hand out at a time
+    workers: Callable[[], int]  # how many are there now
+    hopeless: tuple[type[BaseException], ...] = ()  # failures that another attempt cannot mend
+
+
+class Ended(NamedTuple):
+    """A run that needs no more work: with an outcome, or with what went wrong each time."""
+
+    task: Task
+    outcome: Outcome | None
+    problem: str = ""
+
+
+def run_all(
+    engine: Engine,
+    work: Callable[[Task], Outcome],
+    tasks: Iterable[Task],
+    on_retry: Callable[[Task, str], None] = lambda task, problem: None,
+) -> Iterator[Ended]:
+    """Yields each run as it ends, in no certain order.
+
+    A run that fails or loses its worker is made up to three times. One that raises UserError would
+    do so again, and is not.
+    """
+    waiting = iter(tasks)
+    ended: SimpleQueue[Future[Outcome]] = SimpleQueue()
+    running: dict[Future[Outcome], tuple[Task, int]] = {}
+
+    def start(task: Task, attempt: int = 1) -> None:
+        future: Future[Any] = engine.executor.submit(work, task)
+        running[future] = task, attempt
+        future.add_done_callback(ended.put)
+
+    for task in islice(waiting, engine.in_flight):
+        start(task)
+    while running:
+        future = ended.get()
+        task, attempt = running.pop(future)
+        problem = _problem(future)
+        final = isinstance(problem, (UserError, *engine.hopeless)) or attempt == ATTEMPTS
+        if problem is not None and not final:
+            on_retry(task, _told(problem))
+            start(task, attempt + 1)
+            continue
+        # The worker goes on before the caller writes the result.
+        for following in islice(waiting, 1):
+            start(following)
+        if problem is None:
+            yield Ended(task, future.result())
+        else:
+            yield Ended(task, None, _told(problem))
+
+
+def _problem(future: Future[Outcome]) -> BaseException | None:
+    try:
+        return future.exception()
+    except Exception as error:  # it was cancelled, as Dask does with runs that it has lost
+        return error
+
+
+def _told(problem: BaseException) -> str:
+    text = " ".join(str(problem).split())
+    return text if isinstance(problem, UserError) else f"{type(problem).__name__}: {text}"
