@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import logging
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -22,22 +23,26 @@ _IN_FLIGHT = 2000
 def dask_cluster(address: str, versions: dict[str, str]) -> Iterator[Engine]:
     """Connects to the scheduler at `address`, such as tcp://10.0.0.1:8786.
 
-    Raises UserError when it cannot be reached, has no worker within a minute, or when a worker has
-    other versions than `versions` or more than one thread: TensorFlow's runs would share them.
+    Raises UserError when it cannot be reached, has no worker within a minute, when a worker or the
+    scheduler has other versions than `versions`, or a worker more than one thread: its runs would
+    share one TensorFlow.
     """
     if importlib.util.find_spec("distributed") is None:
         raise UserError("distributed is not installed: pip install 'keras_pendulum[cluster]'")
     from distributed import Client, KilledWorker
 
+    unreachable = UserError(
+        f"no scheduler answers at {address}: start one by `dask scheduler`, and name the address "
+        "that it prints"
+    )
+    if not re.fullmatch(r"((tcp|tls|wss?)://)?[^\s/]+:\d+", address):
+        raise unreachable  # Dask's client would complain of it when it is thrown away
     # What it logs of lost connections is told here in one line.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=_SECONDS_TO_ANSWER, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        raise UserError(
-            f"no scheduler answers at {address}: start one by `dask scheduler`, and name the "
-            "address that it prints"
-        ) from error
+        raise unreachable from error
     try:
         try:
             client.wait_for_workers(1, timeout=_SECONDS_FOR_A_WORKER)
@@ -46,7 +51,7 @@ def dask_cluster(address: str, versions: dict[str, str]) -> Iterator[Engine]:
                 f"the scheduler at {address} has no worker: start some by "
                 f"`dask worker {address} --nthreads 1 --nworkers N`"
             ) from error
-        _require_fit_workers(client, versions)
+        _require_fit_machines(client, versions)
         yield Engine(
             # Dask itself makes a run again whose worker is lost, four times.
             client.get_executor(pure=False),
@@ -58,7 +63,8 @@ def dask_cluster(address: str, versions: dict[str, str]) -> Iterator[Engine]:
         client.close(timeout=_SECONDS_TO_ANSWER)
 
 
-def _require_fit_workers(client: Any, versions: dict[str, str]) -> None:
+def _require_fit_machines(client: Any, versions: dict[str, str]) -> None:
+    answers: dict[str, Any]
     for worker, threads in client.nthreads().items():
         if threads != 1:
             raise UserError(
@@ -75,8 +81,15 @@ def _require_fit_workers(client: Any, versions: dict[str, str]) -> None:
             return {"keras_pendulum": keras_pendulum.__version__}
         return installed_versions()
 
+    # The scheduler unpickles what it hands out, so it needs the package too.
+    try:
+        answers = {"the scheduler": client.run_on_scheduler(found)}
+    except Exception as error:
+        answers = {"the scheduler": error}
     for worker, answer in client.run(found, on_error="return").items():
+        answers[f"the worker {worker}"] = answer
+    for who, answer in answers.items():
         if isinstance(answer, BaseException):
             told = " ".join(str(answer).split())
-            raise UserError(f"the worker {worker} cannot make runs: {told}") from answer
-        require_versions(versions, answer, f"the worker {worker}")
+            raise UserError(f"{who} cannot make runs: {told}") from answer
+        require_versions(versions, answer, who)

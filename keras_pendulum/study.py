@@ -1,5 +1,6 @@
 """The command `python -m keras_pendulum.study`."""
 
+# PYTHON_ARGCOMPLETE_OK
 from __future__ import annotations
 
 import argparse

@@ -103,9 +103,10 @@ def test_the_declared_dependencies_are_those_imported() -> None:
         for path in ROOT.glob("keras_pendulum/**/*.py")
         for module in imported_modules(path)
     }
-    # IPython is there wherever a notebook is, and imported nowhere else; argcomplete, an extra,
-    # wherever a shell asks for completions.
-    imported -= {"keras_pendulum", "IPython", "argcomplete", *sys.stdlib_module_names}
+    # IPython is there wherever a notebook is, and imported nowhere else; the study and the shell's
+    # completion ask for their extras before they import them.
+    imported -= {"keras_pendulum", "IPython", *sys.stdlib_module_names}
+    imported -= {"argcomplete", "scipy", "distributed"}
     config = configparser.ConfigParser()
     config.read(ROOT / "setup.cfg", encoding="utf-8")
     declared = re.findall(r"^[\w-]+", config["options"]["install_requires"], re.MULTILINE)

@@ -1,0 +1,114 @@
+"""Worker processes outlive one another, and so do the runs of a study."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from keras_pendulum.errors import UserError
+from keras_pendulum.presets import preset
+from keras_pendulum.study_loop import Engine, run_all
+from keras_pendulum.study_result import Result, Task, encode
+from keras_pendulum.study_run import Outcome
+from keras_pendulum.worker_processes import CallFailedError, WorkerDiedError, WorkerProcesses
+
+
+def die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def fail(error: Exception) -> None:
+    raise error
+
+
+def sleep_and_return(path: Path) -> int:
+    path.touch()
+    time.sleep(0.5)
+    return os.getpid()
+
+
+def test_a_killed_worker_costs_its_own_call_alone(tmp_path: Path) -> None:
+    with WorkerProcesses(2) as workers:
+        other = workers.submit(sleep_and_return, tmp_path / "begun")
+        with pytest.raises(WorkerDiedError, match="killed by SIGKILL"):
+            workers.submit(die).result(60)
+        assert other.result(60) != os.getpid()
+        assert workers.submit(abs, -3).result(60) == 3
+
+
+def test_a_call_that_raises_leaves_its_worker_at_work() -> None:
+    with WorkerProcesses(1) as workers:
+        first = workers.submit(os.getpid).result(60)
+        with pytest.raises(UserError, match="told"):
+            workers.submit(fail, UserError("told")).result(60)
+        with pytest.raises(CallFailedError, match="ValueError: oops"):
+            workers.submit(fail, ValueError("oops")).result(60)
+        assert workers.submit(os.getpid).result(60) == first
+        assert workers.submit(os.getenv, "OMP_NUM_THREADS").result(60) == "1"
+
+
+def test_ending_the_workers_does_not_wait_for_their_calls() -> None:
+    workers = WorkerProcesses(1)
+    long, queued = workers.submit(time.sleep, 600), workers.submit(os.getpid)
+    workers.submit(os.getpid)
+    while not long.running():
+        time.sleep(0.01)
+    workers.shutdown(cancel_futures=True)
+    assert isinstance(long.exception(60), WorkerDiedError)
+    assert queued.cancelled()
+
+
+def task(seed: int) -> Task:
+    return Task("arm", "arm", preset("reference", seed=seed), {})
+
+
+class Flaky:
+    """Work that fails the first so many times for each seed."""
+
+    def __init__(self, error: Exception, times: dict[int, int]) -> None:
+        self.error, self.left, self.made = error, times, list[int]()
+
+    def __call__(self, task: Task) -> Outcome:
+        seed = task.config.seed
+        self.made.append(seed)
+        if self.left.get(seed, 0) > 0:
+            self.left[seed] -= 1
+            raise self.error
+        return Outcome(encode(task, Result(0.0, [0.0], [], [])), 0, 0, 0, "here")
+
+
+def test_a_run_that_dies_is_made_up_to_three_times_and_the_others_go_on() -> None:
+    work = Flaky(OSError("gone"), {1: 2, 2: 99})
+    with ThreadPoolExecutor(1) as executor:
+        engine = Engine(executor, 2, lambda: 1)
+        ended = {each.task.config.seed: each for each in run_all(engine, work, map(task, range(5)))}
+    assert sorted(work.made) == [0, 1, 1, 1, 2, 2, 2, 3, 4]
+    assert [seed for seed, each in ended.items() if each.outcome is None] == [2]
+    assert ended[2].problem == "OSError: gone"
+
+
+def test_a_users_mistake_is_not_tried_again() -> None:
+    work = Flaky(UserError("the loss is nan"), {0: 99})
+    with ThreadPoolExecutor(1) as executor:
+        (ended,) = run_all(Engine(executor, 2, lambda: 1), work, [task(0)])
+    assert (work.made, ended.outcome, ended.problem) == ([0], None, "the loss is nan")
+
+
+def test_runs_are_handed_out_a_few_at_a_time() -> None:
+    handed = []
+
+    def tasks() -> object:
+        for seed in range(1000):
+            handed.append(seed)
+            yield task(seed)
+
+    with ThreadPoolExecutor(1) as executor:
+        runs = run_all(Engine(executor, 3, lambda: 1), Flaky(OSError(), {}), tasks())  # type: ignore[arg-type]
+        next(runs)
+        assert len(handed) <= 4
+        assert len(list(runs)) == 999
