@@ -6,7 +6,7 @@ import importlib.util
 import logging
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from keras_pendulum.errors import UserError
@@ -52,15 +52,25 @@ def dask_cluster(address: str, versions: dict[str, str]) -> Iterator[Engine]:
                 f"`dask worker {address} --nthreads 1 --nworkers N`"
             ) from error
         _require_fit_machines(client, versions)
+
+        def require() -> None:
+            if client.status != "running":
+                raise UserError(
+                    f"the scheduler at {address} has gone: no result is lost, and with a scheduler "
+                    "the same command goes on"
+                )
+
         yield Engine(
             # Dask itself makes a run again whose worker is lost, four times.
             client.get_executor(pure=False),
             _IN_FLIGHT,
             lambda: sum(client.nthreads().values()),
+            require,
             (KilledWorker,),
         )
     finally:
-        client.close(timeout=_SECONDS_TO_ANSWER)
+        with suppress(OSError):
+            client.close(timeout=_SECONDS_TO_ANSWER)
 
 
 def _require_fit_machines(client: Any, versions: dict[str, str]) -> None:

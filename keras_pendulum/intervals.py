@@ -17,7 +17,7 @@ from scipy.stats import bootstrap, mannwhitneyu, trim_mean
 
 CONFIDENCE = 0.95
 _RESAMPLES = 9999
-_CURVE_RESAMPLES = 1999
+_CURVE_RESAMPLES = 999
 _NUMBERS_AT_A_TIME = 2_000_000  # of resamples, so that many runs need no more memory than few
 _TRIMMED = 0.25  # at either end
 

@@ -50,16 +50,25 @@ class StudyFolder:
         Raises UserError when it holds another study or something else, or cannot be written.
         """
         try:
-            self._results.mkdir(parents=True, exist_ok=True)
-            for arm in self._maker.values():
-                (self._results / arm.slug).mkdir(exist_ok=True)
+            self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
         with held(self.path):
             if self._manifest.exists():
                 self._require_same_study()
             else:
+                if any(not file.name.startswith(".study.json.") for file in self.path.iterdir()):
+                    raise UserError(
+                        f"{self.path} holds something else than a study: name another folder by "
+                        "--out"
+                    )
                 write_atomically(self._manifest, _json(self._described()))
+            try:
+                for arm in self._maker.values():
+                    (self._results / arm.slug).mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise UserError(f"cannot write in {self.path}: {error.strerror}") from error
+            if not self._log.exists():
                 write_atomically(self._log, (",".join(_LOG_COLUMNS) + "\n").encode())
             yield
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future
 from itertools import islice
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 from keras_pendulum.errors import UserError
@@ -13,6 +13,7 @@ from keras_pendulum.study_result import Task
 from keras_pendulum.study_run import Outcome
 
 ATTEMPTS = 3
+_PATIENCE = 2.0  # seconds without a run's end, after which the engine is asked whether it is there
 
 
 class Engine(NamedTuple):
@@ -21,6 +22,7 @@ class Engine(NamedTuple):
     executor: Executor
     in_flight: int  # how many runs to hand out at a time
     workers: Callable[[], int]  # how many are there now
+    require: Callable[[], None] = lambda: None  # raises UserError when it has gone as a whole
     hopeless: tuple[type[BaseException], ...] = ()  # failures that another attempt cannot mend
 
 
@@ -41,7 +43,7 @@ def run_all(
     """Yields each run as it ends, in no certain order.
 
     A run that fails or loses its worker is made up to three times. One that raises UserError would
-    do so again, and is not.
+    do so again, and is not. Raises UserError when the engine has gone as a whole.
     """
     waiting = iter(tasks)
     ended: SimpleQueue[Future[Outcome]] = SimpleQueue()
@@ -55,9 +57,15 @@ def run_all(
     for task in islice(waiting, engine.in_flight):
         start(task)
     while running:
-        future = ended.get()
+        try:
+            future = ended.get(timeout=_PATIENCE)
+        except Empty:
+            engine.require()
+            continue
         task, attempt = running.pop(future)
         problem = _problem(future)
+        if problem is not None:
+            engine.require()
         final = isinstance(problem, (UserError, *engine.hopeless)) or attempt == ATTEMPTS
         if problem is not None and not final:
             on_retry(task, _told(problem))

@@ -19,7 +19,11 @@ from conftest import Command, command_line
 
 from keras_pendulum import study
 from keras_pendulum.arms import own_arms
+from keras_pendulum.errors import UserError
+from keras_pendulum.presets import preset
 from keras_pendulum.study_folder import StudyFolder
+from keras_pendulum.study_result import Task, installed_versions
+from keras_pendulum.study_run import train_and_score
 
 # Learning starts with episode 41: these make updates too.
 ARMS = [
@@ -153,15 +157,15 @@ def test_control_c_stops_at_once_and_says_how_to_go_on(tmp_path: Path) -> None:
     assert output.count("\n") == 1
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
+def test_a_cluster_that_loses_a_worker_gives_the_same_bytes_and_a_lost_one_is_told(
     finished: Path, tmp_path: Path, command: Command
 ) -> None:
     python, card = sys.executable, tmp_path / "scheduler.json"
-    place = ["--scheduler-file", card, "--no-dashboard"]
+    place = ["--scheduler-file", str(card), "--no-dashboard"]
     server = [python, "-m", "distributed.cli.dask_scheduler", *place, "--host", "127.0.0.1"]
     worker = [python, "-m", "distributed.cli.dask_worker", *place, "--no-nanny", "--nthreads"]
     folder = tmp_path / "study"
-    with started(*server, "--port", "0"):
+    with started(*server, "--port", "0") as scheduler:
         wait_for(card.exists)
         wait_for(lambda: card.read_text().endswith("}"))
         address = json.loads(card.read_text())["address"]
@@ -175,6 +179,16 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
                 wait_for(lambda: result_files(folder))
                 first.kill()
                 output, _ = process.communicate(timeout=200)
+            words[words.index("2")] = "9"
+            longer = Path(f"{folder}-longer")
+            words[words.index(str(folder))] = str(longer)
+            with started(*command_line("study", *words)) as gone:
+                wait_for(lambda: result_files(longer))
+                scheduler.kill()
+                complaint, _ = gone.communicate(timeout=100)
+    assert gone.returncode == 2
+    assert re.search(r"^error: the scheduler at .* has gone: no result is lost.*$", complaint, re.M)
+    assert result_files(longer)
     assert process.returncode == 0, output
     assert result_files(folder) == result_files(finished)
     assert sorted(runs_made(folder)) == sorted(NAMES.values())
@@ -192,6 +206,7 @@ WRONG = [
     (["--workers", "1", "--scheduler", "x:1"], "not allowed with"),
     (["--out", "file"], "cannot make the folder file"),
     (["--out", "other"], "other holds another study"),
+    (["--out", "full"], "full holds something else than a study"),
     (["--out", "broken"], "study.json is damaged"),
     (["--out", "old"], "this machine has numpy"),
     (["--scheduler", "no such place"], "no scheduler answers at no such place"),
@@ -215,6 +230,9 @@ def test_a_mistake_gets_one_clear_line_and_loses_nothing(
     }.items():
         Path(name).mkdir()
         Path(name, "study.json").write_text(content)
+    Path("full").mkdir()
+    Path("full", "config.json").touch()
+    before = sorted(Path().rglob("*"))
     try:
         status = study.main(words)
     except SystemExit as exit:  # argparse leaves by itself
@@ -223,6 +241,7 @@ def test_a_mistake_gets_one_clear_line_and_loses_nothing(
     assert (status, printed.out) == (2, "")
     assert re.fullmatch(r"error: .*\n", printed.err)
     assert message in printed.err
+    assert sorted(Path().rglob("*")) == before
     assert Path("file").read_text() == "mine"
     assert Path("other", "study.json").read_text() == "{}"
 
@@ -233,6 +252,14 @@ def test_other_versions_elsewhere_are_told(finished: Path, tmp_path: Path) -> No
     assert not folder.missing()
     folder.versions = {**folder.versions, "keras": "2.0"}
     assert len(folder.missing()) == 4  # results of other versions are not taken for this study's
+
+
+def test_a_worker_of_another_version_makes_no_run() -> None:
+    task = Task("arm", "arm", preset("reference"), {**installed_versions(), "keras": "2.0"})
+    with pytest.raises(
+        UserError, match=r"the worker .* has keras .*, this study 2\.0: use the same"
+    ):
+        train_and_score(task)
 
 
 def test_help_comes_without_numpy() -> None:
