@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -46,7 +47,7 @@ def study_figure(rows: Sequence[Row], results: Mapping[str, Sequence[Result]]) -
     drawn = [row for row in rows if row.arm.curve][: len(_STYLES)]
     styles = {row.arm.name: style for row, style in zip(drawn, _STYLES, strict=False)}
     tasks = list(dict.fromkeys(row.arm.task for row in drawn))
-    height = max(5.5, 1.5 + 0.42 * len(rows), 4.0 * len(tasks))
+    height = max(6.5, 1.5 + 0.55 * len(rows), 4.0 * len(tasks))
     figure = Figure(figsize=(13, height), layout="constrained")
     grid = figure.add_gridspec(max(1, len(tasks)), 2, width_ratios=(1, 1.05))
     _draw_regrets(figure.add_subplot(grid[:, 0]), rows, styles)
@@ -75,12 +76,13 @@ def _draw_regrets(axes: Axes, rows: Sequence[Row], styles: Mapping[str, _Style])
         axes.set_xscale("log")
     else:
         axes.set_xscale("symlog", linthresh=1)
-    axes.margins(x=0.12)
-    axes.set_yticks(range(len(rows)), [row.arm.name for row in rows])
+    axes.margins(x=0.2)
+    names = [textwrap.fill(row.arm.name, 36, break_on_hyphens=False) for row in rows]
+    axes.set_yticks(range(len(rows)), names)
     axes.set_ylim(len(rows) - 0.5, -0.6)
     axes.grid(axis="x", color="0.9")
     axes.set_axisbelow(True)
-    axes.set_xlabel("Regret: what the greedy policy lacks of the best possible return")
+    axes.set_xlabel("Regret (best possible return minus achieved)")
     axes.set_title(
         "Interquartile mean, 95 % bootstrap interval; ticks below: runs", fontsize="medium"
     )
@@ -94,7 +96,7 @@ def _draw_curves(
 ) -> None:
     task = TASKS[rows[0].arm.config.environment]
     for row in rows:
-        color, line, _ = styles[row.arm.name]
+        color, line, marker = styles[row.arm.name]
         curves = [
             run.average_rewards if task.never_terminates else run.episode_returns
             for run in results[row.arm.name]
@@ -104,7 +106,16 @@ def _draw_curves(
         starts = np.arange(len(middle)) * EPISODES_A_POINT
         ends = np.minimum(starts + EPISODES_A_POINT, row.arm.config.episodes)
         episodes = (starts + ends - 1) / 2
-        axes.plot(episodes, middle, color=color, linestyle=line, linewidth=2, label=row.arm.name)
+        axes.plot(
+            episodes,
+            middle,
+            color=color,
+            linestyle=line,
+            linewidth=1.7,
+            marker=marker,
+            markevery=max(1, len(middle) // 8),
+            label=row.arm.name,
+        )
         axes.fill_between(episodes, low, high, color=color, alpha=0.18, linewidth=0)
     if task.never_terminates:
         axes.set_ylabel("Average reward per step while learning")
@@ -112,5 +123,13 @@ def _draw_curves(
         axes.set_ylabel("Return (steps) while learning")
     axes.set(xlabel="Episode", title=f"{rows[0].arm.task}: means of {EPISODES_A_POINT} episodes")
     axes.title.set_fontsize("medium")
-    axes.legend(loc="lower right", fontsize="small", framealpha=0.9)
+    # Below, where it covers no curve.
+    axes.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.11),
+        ncols=1,
+        fontsize="small",
+        frameon=False,
+        handlelength=4,
+    )
     axes.grid(color="0.9")
