@@ -53,11 +53,14 @@ def of_network(network: DQN, reward_scale: float = 1.0) -> PhasePlane:
         network: of the pendulum.
         reward_scale: the factor on the rewards that it learned from, taken back here.
     """
-    theta, speed = (axis.ravel() for axis in np.meshgrid(_THETA, _SPEED))  # [N]
-    observations = np.stack([np.cos(theta), np.sin(theta), speed], axis=1, dtype=np.float32)
-    q = GreedyPolicy(network).q_values(observations)  # [N, A]
-    torque = TorqueGrid(network.action_count).torques[q.argmax(axis=1)]
-    return PhasePlane(_grid(torque), _grid(q.max(axis=1) / reward_scale))
+    policy, grid = GreedyPolicy(network), TorqueGrid(network.action_count)
+    torque, value = [], []
+    for speed in _SPEED:  # row by row, which takes little memory
+        axes = [np.cos(_THETA), np.sin(_THETA), np.full(POINTS, speed)]
+        q = policy.q_values(np.stack(axes, axis=1, dtype=np.float32))  # [POINTS, A]
+        torque.append(grid.torques[q.argmax(axis=1)])
+        value.append(q.max(axis=1) / reward_scale)
+    return PhasePlane(np.array(torque), np.array(value))
 
 
 def of_optimum(gravity: float, discount: float) -> PhasePlane:
@@ -74,11 +77,10 @@ def of_optimum(gravity: float, discount: float) -> PhasePlane:
     if 0 < discount < 1:
         horizon = min(horizon, math.ceil(math.log(1e-3) / math.log(discount)))
     table = solve(gravity, horizon, _THETA_CELLS, discount)
-    theta, speed = (axis.ravel() for axis in np.meshgrid(_THETA, _SPEED))  # [N]
-    rewards, thetas, speeds = try_torques(gravity, theta, speed)  # [N, A]
-    values = rewards + discount * value_at(table, thetas, speeds)
-    return PhasePlane(_grid(TORQUES[values.argmax(axis=1)]), _grid(values.max(axis=1)))
-
-
-def _grid(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return values.reshape(POINTS, POINTS)
+    torque, value = [], []
+    for speed in _SPEED:
+        rewards, thetas, speeds = try_torques(gravity, _THETA, np.full(POINTS, speed))
+        values = rewards + discount * value_at(table, thetas, speeds)  # [POINTS, A]
+        torque.append(TORQUES[values.argmax(axis=1)])
+        value.append(values.max(axis=1))
+    return PhasePlane(np.array(torque), np.array(value))
