@@ -70,6 +70,17 @@ def test_the_text_beside_a_table_has_the_measured_regrets_too(preset: str) -> No
     assert f"of `{BEFORE[preset]}` {summary(regrets[BEFORE[preset]])}." in flowing
 
 
+def test_the_studys_table_is_the_measured_one() -> None:
+    def rows(text: str) -> list[list[str]]:
+        lines = [line for line in text.splitlines() if line.startswith("|")][2:]
+        return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+    shown = README.split("## What each change is worth")[1].split("\n## ")[0]
+    measured = rows((ROOT / "docs" / "study" / "table.md").read_text(encoding="utf-8"))
+    assert rows(shown) == [[row[0], row[3], row[4], row[6]] for row in measured]
+    assert all(row[2] == "10" for row in measured)
+
+
 def test_the_regrets_of_the_first_seeds_are_the_measured_ones() -> None:
     found = re.search(
         r"Regret: ([\d.]+)\n.*With `--seed 1` it is ([\d.]+) and\nwith `--seed 2` ([\d.]+)\.",
