@@ -77,8 +77,17 @@ def _study(arguments: argparse.Namespace) -> int:
     folder = StudyFolder(
         Path(arguments.out or Path("studies") / slugs[:100]), arms, arguments.seeds
     )
-    with _engine(arguments, folder) as engine, folder.opened():
-        failed = _make_runs(folder, engine)
+    try:
+        with _engine(arguments, folder) as engine, folder.opened():
+            failed = _make_runs(folder, engine)
+    except KeyboardInterrupt:
+        everything = len(folder.tasks())
+        print(
+            f"Interrupted: {everything - len(folder.missing())} of {everything} runs are in "
+            f"{folder.path}; the same command goes on with the others",
+            file=sys.stderr,
+        )
+        raise
     _report(folder, arms)
     if failed:
         told = "; ".join(f"{_called(task)}: {problem}" for task, problem in failed[:5])
@@ -122,29 +131,21 @@ def _make_runs(folder: StudyFolder, engine: Engine) -> list[tuple[Task, str]]:
     failed: list[tuple[Task, str]] = []
     training = evaluation = 0.0
     begun = time.perf_counter()
-    try:
-        for task, outcome, problem in run_all(engine, train_and_score, missing, _tell_retry):
-            if outcome is None:
-                failed.append((task, problem))
-                print(f"{_called(task)}: failed, {problem}", file=sys.stderr, flush=True)
-                continue
-            result = folder.keep(task, outcome)
-            done += 1
-            training += outcome.training
-            evaluation += outcome.evaluation
-            left = (time.perf_counter() - begun) * (len(everything) - done) / (done - before)
-            print(
-                f"{_called(task)}: regret {result.regret:.2f}, {outcome.total:.1f} s, "
-                f"{done}/{len(everything)}, {int(left) // 60}:{int(left) % 60:02} left",
-                flush=True,
-            )
-    except KeyboardInterrupt:
+    for task, outcome, problem in run_all(engine, train_and_score, missing, _tell_retry):
+        if outcome is None:
+            failed.append((task, problem))
+            print(f"{_called(task)}: failed, {problem}", file=sys.stderr, flush=True)
+            continue
+        result = folder.keep(task, outcome)
+        done += 1
+        training += outcome.training
+        evaluation += outcome.evaluation
+        left = (time.perf_counter() - begun) * (len(everything) - done) / (done - before)
         print(
-            f"Interrupted: {done} of {len(everything)} runs are in {folder.path}; the same command "
-            "goes on with the others",
-            file=sys.stderr,
+            f"{_called(task)}: regret {result.regret:.2f}, {outcome.total:.1f} s, "
+            f"{done}/{len(everything)}, {int(left) // 60}:{int(left) % 60:02} left",
+            flush=True,
         )
-        raise
     seconds, made = time.perf_counter() - begun, done - before
     if made:
         workers = max(1, engine.workers())
