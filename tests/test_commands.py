@@ -28,7 +28,7 @@ from keras_pendulum.episodes import EpisodeRecord
 RECORDED = DATA / "pendulum_weight.keras2.h5"
 
 
-@pytest.mark.parametrize("name", ["train", "evaluate"])
+@pytest.mark.parametrize("name", ["train", "evaluate", "play", "page", "study"])
 def test_help_comes_without_tensorflow(name: str) -> None:
     code = (
         "import runpy, sys\n"

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 import webbrowser
 from pathlib import Path
 
@@ -32,22 +30,6 @@ def test_the_command_writes_one_small_file_and_says_how_to_open_it(
     text = out.read_text(encoding="utf-8")
     assert '"gravity": 10.0, "trainedGravity": 1.0' in text
     assert not re.search(r'(src|href)="', text)
-
-
-def test_help_comes_without_tensorflow() -> None:
-    code = (
-        "import sys\n"
-        "from keras_pendulum import page\n"
-        "try:\n"
-        "    page.main(['--help'])\n"
-        "except SystemExit as exit:\n"
-        "    assert exit.code == 0\n"
-        "heavy = {'tensorflow', 'keras', 'gymnasium', 'matplotlib', 'h5py', 'numpy'}\n"
-        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "usage: python -m keras_pendulum.page" in done.stdout
 
 
 WRONG = [
