@@ -150,6 +150,11 @@ def _state(file: h5py.File, path: str | os.PathLike[str]) -> dict[str, Any]:
         raise WeightsError(
             f"{path}: holds weights alone, no run to resume: use --init to start one"
         )
+    if "0" in file["target"]:  # an array for each variable, as they were kept before `_flat`
+        raise WeightsError(
+            f"{path}: its run was saved by an older version of keras_pendulum and cannot go on "
+            "with this one; to start a run from its weights use --init"
+        )
     text = layer_files.read_array(file["run/state"], path).tobytes()
     state: dict[str, Any] = json.loads(text)
     return state

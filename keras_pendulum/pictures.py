@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from keras_pendulum.episodes import EpisodeRecord
 
-_LEVEL_LINES = (("black", "--"), ("#D55E00", ":"))
+_LEVEL_LINES = {"best possible": ("black", "--"), "random actions": ("#D55E00", ":")}
 
 
 def finished_run(
@@ -35,7 +35,8 @@ def finished_run(
     Args:
         history: at least one record.
         environment: which the episodes are of.
-        returns: mean returns of whole episodes to compare with, by name; each a level line.
+        returns: mean returns of whole episodes to compare with, by name (`best possible`,
+            `random actions`); each a level line.
         planes: maps to set side by side, by name; may be empty.
 
     Returns:
@@ -115,7 +116,8 @@ def _draw_curve(
         mean = np.convolve(values, np.ones(mean_over) / mean_over, "valid")
         name = f"mean of {mean_over} episodes"
         axes.plot(range(mean_over - 1, len(values)), mean, color="#0072B2", linewidth=2, label=name)
-    for (name, level), (color, style) in zip(levels.items(), _LEVEL_LINES, strict=False):
+    for name, level in levels.items():
+        color, style = _LEVEL_LINES[name]
         axes.axhline(level, color=color, linestyle=style, label=name)
     axes.set(xlabel="Episode", ylabel=label)
     # Above, where it covers no episode.

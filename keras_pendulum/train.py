@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from keras_pendulum.run_folder import RunFolder
     from keras_pendulum.training import TrainingResult
 
-_EVALUATION_EPISODES = 100
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Parses the command line and trains; returns the exit status."""
@@ -157,9 +155,9 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
         f"updates); this took {seconds:.1f} s."
     )
     if result.finished:
-        score = evaluate_policy(result.network, _EVALUATION_EPISODES)
+        score = evaluate_policy(result.network)
         print(score.summary())
-        chance = random_return(score.environment, score.gravity, _EVALUATION_EPISODES)
+        chance = random_return(score.environment, score.gravity)
         print(f"Uniformly random actions on the same starts: {chance:.2f}")
     saved = ", ".join(file.name for file in folder.files if file.exists())
     print(f"Saved in {folder.path}: {saved}")

@@ -378,6 +378,22 @@ def test_a_file_with_weights_alone_is_no_run_to_resume(tmp_path: Path) -> None:
         kp.train_dqn(kp.preset("original"), tmp_path, resume=True)
 
 
+def test_a_run_that_an_older_version_saved_is_told_and_its_weights_load(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    trained = kp.train_dqn(config, tmp_path).network
+    checkpoint = tmp_path / "pendulum_weight.h5"
+    with h5py.File(checkpoint, "r+") as file:
+        del file["target"]
+        for number, array in enumerate(trained.get_weights()):  # one array for each variable
+            file[f"target/{number}"] = array
+    with pytest.raises(kp.WeightsError, match=r"older version .* use --init"):
+        kp.train_dqn(config, tmp_path, resume=True)
+    for ours, theirs in zip(
+        trained.get_weights(), kp.load_weights(checkpoint).get_weights(), strict=True
+    ):
+        np.testing.assert_array_equal(ours, theirs)
+
+
 def test_a_checkpoint_records_the_runs_settings(tmp_path: Path) -> None:
     config = kp.preset("walkthrough", gravity=2.5, seed=9)
     save_checkpoint(Run(config), tmp_path / "a.h5")
