@@ -4,14 +4,18 @@
 
 Makes the same RUNS (8) runs of `reference` on one worker and on two, workers warm, as whole
 studies without the command: results are written and read like a user's. 8 runs of 500 episodes take
-three minutes on two cores.
+three minutes on two cores. Beside it stands what the machine itself gives to two processes that do
+nothing but multiply matrices of an update's size: where its cores share what they compute with,
+no study can do better.
 """
 
 from __future__ import annotations
 
+import statistics
 import sys
 import tempfile
 import time
+from concurrent.futures import wait
 from pathlib import Path
 
 import keras_pendulum as kp
@@ -21,6 +25,28 @@ from keras_pendulum.study_folder import StudyFolder
 from keras_pendulum.study_loop import Engine, run_all
 from keras_pendulum.study_run import train_and_score
 from keras_pendulum.worker_processes import WorkerProcesses
+
+
+def multiply(times: int) -> None:
+    """Matrix products of the widest layer's size, on one thread."""
+    import numpy as np
+
+    features, kernel = np.ones((32, 512), np.float32), np.ones((512, 256), np.float32)
+    for _ in range(times):
+        features @ kernel
+
+
+def machine_efficiency(workers: int) -> float:
+    """How fast each of so many processes multiplies beside the others, against one alone."""
+    with WorkerProcesses(workers) as executor:
+
+        def seconds(processes: int) -> float:
+            started = time.perf_counter()
+            wait([executor.submit(multiply, 20_000) for _ in range(processes)])
+            return time.perf_counter() - started
+
+        seconds(workers)  # starts them
+        return statistics.median(seconds(1) / seconds(workers) for _ in range(5))
 
 
 def measured(workers: int, runs: int, episodes: int) -> Row:
@@ -52,6 +78,7 @@ def measured(workers: int, runs: int, episodes: int) -> Row:
         "seconds": round(seconds, 1),
         "seeds per core-hour": round(3600 * runs / (seconds * workers)),
         "efficiency": "",
+        "of bare matrix products": "",
         "training (s a run)": round(training / runs, 2),
         "evaluation (s a run)": round(evaluation / runs, 2),
         "all else (s a run)": round((seconds * workers - training - evaluation) / runs, 3),
@@ -65,6 +92,7 @@ def main(runs: int = 8, episodes: int = 500) -> None:
     rows = [measured(workers, runs, episodes) for workers in (1, 2)]
     for row in rows:
         row["efficiency"] = round(rows[0]["seconds"] / (row["workers"] * row["seconds"]), 2)
+        row["of bare matrix products"] = round(machine_efficiency(row["workers"]), 2)
     write("study_cost", f"python -m benchmarks.study_cost {runs} {episodes}", rows)
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from keras_pendulum.episodes import EpisodeRecord
 
-_LEVEL_LINES = {"best possible": ("black", "--"), "random actions": ("#D55E00", ":")}
+_BEST = "best possible"  # the level that is drawn in black
 
 
 def finished_run(
@@ -35,8 +35,8 @@ def finished_run(
     Args:
         history: at least one record.
         environment: which the episodes are of.
-        returns: mean returns of whole episodes to compare with, by name (`best possible`,
-            `random actions`); each a level line.
+        returns: mean returns of whole episodes to compare with, by name: `best possible`, and one
+            more at most; each a level line.
         planes: maps to set side by side, by name; may be empty.
 
     Returns:
@@ -117,7 +117,7 @@ def _draw_curve(
         name = f"mean of {mean_over} episodes"
         axes.plot(range(mean_over - 1, len(values)), mean, color="#0072B2", linewidth=2, label=name)
     for name, level in levels.items():
-        color, style = _LEVEL_LINES[name]
+        color, style = ("black", "--") if name == _BEST else ("#D55E00", ":")
         axes.axhline(level, color=color, linestyle=style, label=name)
     axes.set(xlabel="Episode", ylabel=label)
     # Above, where it covers no episode.
