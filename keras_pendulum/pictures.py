@@ -119,6 +119,7 @@ def _draw_curve(
     for name, level in levels.items():
         color, style = ("black", "--") if name == _BEST else ("#D55E00", ":")
         axes.axhline(level, color=color, linestyle=style, label=name)
+    axes.autoscale(axis="y")  # else a level between the outermost episode and the frame lies on it
     axes.set(xlabel="Episode", ylabel=label)
     # Above, where it covers no episode.
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, frameon=False)

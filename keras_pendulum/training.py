@@ -133,8 +133,8 @@ def _levels(config: Config) -> dict[str, float]:
     task = TASKS[config.environment]
     if config.episode_steps != task.steps_per_episode:
         return {}  # they would not be of the same steps
-    levels = {}
+    best = float(task.steps_per_episode)  # CartPole's: 1 a step
     if config.gravity is not None:
-        levels["best possible"] = float(optimal_return(config.gravity, USUAL_SEEDS).mean())
-    levels["random actions"] = random_return(config.environment, config.gravity)
-    return levels
+        best = float(optimal_return(config.gravity, USUAL_SEEDS).mean())
+    chance = random_return(config.environment, config.gravity)
+    return {"best possible": best, "random actions": chance}

@@ -8,6 +8,7 @@ import math
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import keras_pendulum as kp
 from keras_pendulum import pictures
@@ -87,3 +88,12 @@ def test_the_figure_of_a_run_is_drawn_with_and_without_maps_and_losses() -> None
             sizes.append(matplotlib.image.imread(io.BytesIO(png)).shape[:2])
     assert sizes == [(1250, 900)] * 2 + [(600, 900)] * 2
     assert matplotlib.image.imread(io.BytesIO(pictures.phase_planes(maps))).shape[:2] == (650, 900)
+
+
+def test_a_level_does_not_lie_on_the_frame_of_the_learning_curve() -> None:
+    axes = Figure().subplots()
+    levels = {"best possible": 0.04, "random actions": -1.04}  # just inside the usual margins
+    pictures._draw_curve(axes, [0.0, -1.0], "Return", mean_over=10, levels=levels)
+    low, high = axes.get_ylim()
+    assert high - 0.04 > 0.03
+    assert -1.04 - low > 0.03

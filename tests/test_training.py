@@ -286,22 +286,25 @@ def test_resuming_with_other_settings_names_the_one_that_differs(tmp_path: Path)
         kp.train_dqn(other, tmp_path, resume=True)
 
 
+@pytest.mark.parametrize(
+    ("preset", "best", "chance"), [("original", -40.69, -909), ("cartpole", 500, 20.6)]
+)
 def test_the_picture_shows_the_best_possible_above_chance(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    preset: str, best: float, chance: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[tuple[float, float]] = []
 
     def draw(history: Any, environment: str, returns: dict[str, float], planes: Any) -> bytes:
+        assert list(returns) == ["best possible", "random actions"]
         drawn.append((returns["best possible"], returns["random actions"]))
         return b"a picture"
 
     monkeypatch.setattr("keras_pendulum.pictures.finished_run", draw)
-    kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
+    kp.train_dqn(kp.preset(preset, episodes=1, hidden_units=(8,)), tmp_path)
     assert (tmp_path / "rewards.png").read_bytes() == b"a picture"
     assert len(drawn) == 1
-    best, chance = drawn[0]
-    assert best == pytest.approx(-40.69, abs=0.05)
-    assert chance == pytest.approx(-909, rel=0.1)
+    assert drawn[0][0] == pytest.approx(best, abs=0.05)
+    assert drawn[0][1] == pytest.approx(chance, rel=0.1)
 
 
 def test_a_run_killed_in_its_first_episode_leaves_one_run_and_can_be_resumed(
