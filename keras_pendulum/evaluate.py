@@ -14,6 +14,8 @@ from keras_pendulum.atomic_file import require_no_other_file, write_atomically
 from keras_pendulum.backend import quick_import, require_tensorflow
 from keras_pendulum.command_line import OneLineParser, name, run_command
 from keras_pendulum.display import draw_without_display, require_display
+from keras_pendulum.errors import UserError
+from keras_pendulum.lost_window import LossGuard
 
 if TYPE_CHECKING:
     from keras_pendulum.network import DQN
@@ -44,12 +46,17 @@ def _evaluate(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     if arguments.gif:
         require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
+    guard = LossGuard() if arguments.render else None
     if arguments.render:
         require_display()
 
     with quick_import():
         from keras_pendulum.evaluation import evaluate_policy
         from keras_pendulum.weights import find_weights, load_weights
+
+    def watch(env: Any) -> None:
+        if guard and guard.closed():  # Gymnasium would go on without it
+            raise UserError("the window was closed before the last episode was over")
 
     path = find_weights(arguments.weights)
     network = load_weights(path)
@@ -59,6 +66,7 @@ def _evaluate(arguments: argparse.Namespace) -> int:
         arguments.seed,
         gravity=arguments.gravity,
         render_mode="human" if arguments.render else None,
+        on_step=watch,
     )
     if arguments.gif:
         _film(network, arguments.seed, score.gravity, arguments.gif)

@@ -7,6 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 from keras_pendulum.display import require_display
+from keras_pendulum.lost_window import LossGuard
 
 if TYPE_CHECKING:
     from keras_pendulum.episodes import EpisodeRecord
@@ -72,6 +73,7 @@ class _NotebookOutput:
 
 class _Window:
     def __init__(self) -> None:
+        self._guard = LossGuard()
         require_display()
         self._screen: Any = None
         self._closed = False
@@ -93,7 +95,7 @@ class _Window:
         if self._screen is not None and not self._closed:
             import pygame
 
-            if pygame.event.get(pygame.QUIT):
+            if self._guard.closed():
                 self._closed = True
                 pygame.display.quit()
             else:

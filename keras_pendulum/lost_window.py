@@ -37,6 +37,12 @@ class LossGuard:
         for handler in handlers:  # Xlib keeps only pointers to them, to the end of the process
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(handler))
 
+    def closed(self) -> bool:
+        """Whether the window has been destroyed, or its owner has asked to close it."""
+        import pygame
+
+        return self.lost or bool(pygame.event.get(pygame.QUIT))
+
     def _note(self, display: int, event: int) -> int:
         self.lost = True
         return 0

@@ -25,6 +25,7 @@ from keras_pendulum.config import Config
 from keras_pendulum.display import require_display
 from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import UserError
+from keras_pendulum.lost_window import LossGuard
 from keras_pendulum.presets import PRESETS, preset
 from keras_pendulum.progress import make_progress
 
@@ -70,6 +71,7 @@ def _train(arguments: argparse.Namespace) -> int:
         raise UserError("--init starts a new run, --resume goes on with one: give one of them")
     require_tensorflow()
     if arguments.render:
+        LossGuard()  # without its window the training goes on
         require_display()
     live = _live_plot() if arguments.live else None
 

@@ -20,13 +20,14 @@ import pytest
 from conftest import Command, Refusal, command_line
 
 import keras_pendulum as kp
-from keras_pendulum import cockpit, play
+from keras_pendulum import cockpit, evaluate, play
 from keras_pendulum.driving import Drive, Policy
 from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
 from keras_pendulum.game import READY_FRAMES, Game
 from keras_pendulum.lost_window import LossGuard
 
 NO_SCREEN = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
+CLOSED = "error: the window was closed before the last episode was over\n"
 STEP = re.compile(r"Step: (\d+), Torque: (\S+), Reward: (\S+), Return: (\S+)")
 
 
@@ -382,12 +383,14 @@ def screen() -> Iterator[Screen]:
 class Playing:
     """The command in a window of the screen, and what it has printed so far."""
 
+    command: tuple[str, ...] = ("play", "--print-steps")
+
     def __init__(self, screen: Screen, folder: Path, *words: str) -> None:
         self.screen = screen
         self._out, self._err = folder / "out", folder / "err"
         with self._out.open("w") as out, self._err.open("w") as err:
             self.process = subprocess.Popen(
-                command_line("play", "--print-steps", *words),
+                command_line(*self.command, *words),
                 env=screen.environment,
                 stdout=out,
                 stderr=err,
@@ -484,3 +487,39 @@ def test_control_c_ends_it(screen: Screen, tmp_path: Path) -> None:
         game.process.send_signal(signal.SIGINT)
         assert game.end() == 130
     assert game.err == ""
+
+
+class Watching(Playing):
+    """Another command with a window; its words begin with its name."""
+
+    command = ()
+
+
+def test_a_destroyed_window_ends_an_evaluation_in_one_line(screen: Screen, tmp_path: Path) -> None:
+    with Watching(screen, tmp_path, "evaluate", "reference", "--render") as film:
+        screen.xdotool("windowclose", film.window())
+        assert film.end() == 2
+    assert film.out == ""
+    assert film.err.endswith(CLOSED)
+    assert "X Error" not in film.err
+
+
+@pytest.mark.parametrize("flag", ["--live", "--render"])
+def test_a_destroyed_window_does_not_end_a_training(
+    flag: str, screen: Screen, tmp_path: Path
+) -> None:
+    episodes = "60" if flag == "--live" else "1"
+    words = ["train", flag, "--quiet", "--episodes", episodes, "--out", str(tmp_path / "run")]
+    with Watching(screen, tmp_path, *words) as training:
+        screen.xdotool("windowclose", training.window())
+        assert training.end() == 0
+    assert "X Error" not in training.err
+    assert f"Trained {episodes} episodes" in training.out
+
+
+def test_closing_the_window_ends_an_evaluation_in_one_line(
+    no_window: None, refusal: Refusal
+) -> None:
+    pygame.display.init()
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    assert refusal(evaluate.main, ["reference", "--render"]) == CLOSED
