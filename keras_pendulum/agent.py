@@ -10,6 +10,7 @@ import numpy as np
 import tensorflow as tf
 from numpy.typing import NDArray
 
+from keras_pendulum.flat_variables import FlatVariables
 from keras_pendulum.network import DQN
 from keras_pendulum.policy import GreedyPolicy
 from keras_pendulum.q_learning import double_td_target, td_target
@@ -54,6 +55,10 @@ class Agent:
         self.double_q = double_q
         self.random = random
         optimizer.build(online.trainable_variables)
+        self._state = {
+            "target": FlatVariables(target.weights),
+            "optimizer": FlatVariables(optimizer.variables),
+        }
         # By the shapes of what goes in, which stay the same during a run.
         self._compiled: dict[tuple[int, ...], Callable[..., tuple[tf.Tensor, tf.Tensor]]] = {}
         # What there is to act on since the last update: a copy of the weights, or one observation
@@ -119,24 +124,23 @@ class Agent:
         self.update_target(self.online, self.target, self.optimizer.iterations)
         return loss
 
-    def get_state(self) -> dict[str, list[NDArray[Any]]]:
-        """Copies of the target's weights and the optimizer's variables.
+    def get_state(self) -> dict[str, dict[str, NDArray[Any]]]:
+        """Copies of the target's weights and the optimizer's variables, as FlatVariables has them.
 
         The online weights are not among them: they are the policy, kept by `weights`.
         """
-        return {
-            "target": self.target.get_weights(),
-            "optimizer": [variable.value.numpy() for variable in self.optimizer.variables],
-        }
+        return {name: variables.read() for name, variables in self._state.items()}
 
-    def set_state(self, online: list[NDArray[Any]], state: dict[str, list[NDArray[Any]]]) -> None:
-        """Goes on from online weights and a state of `get_state`."""
-        self.target.set_weights(state["target"])
+    def set_state(
+        self, online: list[NDArray[Any]], state: dict[str, dict[str, NDArray[Any]]]
+    ) -> None:
+        """Goes on from online weights and a state of `get_state`.
+
+        Raises ValueError when they do not fit.
+        """
+        for name, variables in self._state.items():
+            variables.write(state[name])
         self.online.set_weights(online)
-        for variable, value in zip(self.optimizer.variables, state["optimizer"], strict=True):
-            if value.shape != tuple(variable.shape):  # assign would stretch it
-                raise ValueError(f"{variable.name} has shape {value.shape}")
-            variable.assign(value)
         self._greedy = self._valued = None
 
 

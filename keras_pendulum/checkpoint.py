@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, fields
 from typing import Any
@@ -21,6 +20,8 @@ from keras_pendulum.integrity import write_sealed
 from keras_pendulum.run import Run
 from keras_pendulum.weights import require_finite, weights_file
 
+_AgentState = dict[str, dict[str, NDArray[Any]]]
+
 # A resumed run may be made longer or saved at other times; anything else would be another run.
 _MAY_CHANGE = {"episodes", "save_every"}
 
@@ -31,14 +32,14 @@ def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
     Raises UserError when the file cannot be written, or a weight or a variable of the optimizer is
     not finite; an old checkpoint is then unharmed.
     """
-    write_sealed(path, _content(run))
+    _write(path, *_snapshot(run))
 
 
 class CheckpointWriter:
     """Saves a run while it goes on.
 
-    The run waits until there is a file's content; a thread of its own takes the digest and writes
-    to the disk. Leaving the `with` block waits for the last one.
+    The run waits until there is a file's content; a thread of its own checks it, takes the digest
+    and writes to the disk. Leaving the `with` block waits for the last one.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -49,11 +50,12 @@ class CheckpointWriter:
     def save(self, run: Run) -> None:
         """Begins a checkpoint of the run as it stands, once the one before it is written.
 
-        Raises UserError as `save_checkpoint` does, and when the one before failed.
+        Raises UserError as `save_checkpoint` does, if not now, then from the next call or the end
+        of the `with` block.
         """
-        content = _content(run)
+        snapshot = _snapshot(run)
         self._wait()
-        self._last = self._thread.submit(write_sealed, self.path, content)
+        self._last = self._thread.submit(_write, self.path, *snapshot)
 
     def _wait(self) -> None:
         if self._last is not None:
@@ -68,20 +70,25 @@ class CheckpointWriter:
             self._wait()
 
 
-def _content(run: Run) -> bytes:
-    agent = run.agent.get_state()
+def _write(path: str | os.PathLike[str], content: bytes, agent: _AgentState) -> None:
     for arrays in agent.values():
-        require_finite(arrays)
+        require_finite(arrays.values())
+    write_sealed(path, content)
+
+
+def _snapshot(run: Run) -> tuple[bytes, _AgentState]:
+    """A checkpoint's content, and what of it has still to be checked."""
+    agent = run.agent.get_state()
     state = {
         "config": asdict(run.config),
         "random": run.random.get_state(),
         "environment": run.env.unwrapped.np_random.bit_generator.state,
         "replay_added": run.replay.added,
     }
-    return weights_file(
+    content = weights_file(
         run.agent.online,
-        target=_flat(agent["target"]),
-        optimizer=_flat(agent["optimizer"]),
+        target=agent["target"],
+        optimizer=agent["optimizer"],
         replay=run.replay.get_state(),
         run={
             # JSON as an array: an attribute can hold no more than 64 KB.
@@ -89,6 +96,7 @@ def _content(run: Run) -> bytes:
             "history": np.array(run.history, np.float64).reshape(-1, len(EpisodeRecord._fields)),
         },
     )
+    return content, agent
 
 
 def load_config(path: str | os.PathLike[str]) -> Config:
@@ -127,8 +135,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
             )
         run = Run(config, render=render)
         online = layer_files.read_layers(file, path, run.agent.online.observation_size)
-        fresh = run.agent.get_state()
-        agent = {name: _shaped(_arrays(file, name, path), fresh[name]) for name in fresh}
+        agent = {name: _arrays(file, name, path) for name in ("target", "optimizer")}
         run.agent.set_state(online, agent)
         run.replay.set_state(_arrays(file, "replay", path), state["replay_added"])
         run.random.set_state(state["random"])
@@ -150,7 +157,7 @@ def _state(file: h5py.File, path: str | os.PathLike[str]) -> dict[str, Any]:
         raise WeightsError(
             f"{path}: holds weights alone, no run to resume: use --init to start one"
         )
-    if "0" in file["target"]:  # an array for each variable, as they were kept before `_flat`
+    if "0" in file["target"]:  # an array for each variable, as they once were kept
         raise WeightsError(
             f"{path}: its run was saved by an older version of keras_pendulum and cannot go on "
             "with this one; to start a run from its weights use --init"
@@ -162,28 +169,6 @@ def _state(file: h5py.File, path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _arrays(file: h5py.File, group: str, path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     return {name: layer_files.read_array(entry, path) for name, entry in file[group].items()}
-
-
-def _flat(arrays: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Their numbers, one after the other, by type: few arrays are written faster than many."""
-    types = dict.fromkeys(array.dtype.name for array in arrays)
-    return {
-        name: np.concatenate([array.ravel() for array in arrays if array.dtype.name == name])
-        for name in types
-    }
-
-
-def _shaped(flat: dict[str, NDArray[Any]], like: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
-    """The arrays of `_flat`, of the shapes of `like`. Raises ValueError when they do not fit."""
-    rest = dict(flat)
-    arrays = []
-    for array in like:
-        name = array.dtype.name
-        arrays.append(rest[name][: array.size].reshape(array.shape))
-        rest[name] = rest[name][array.size :]
-    if any(map(len, rest.values())):
-        raise ValueError("more numbers than the agent has")
-    return arrays
 
 
 def _record(row: NDArray[np.float64]) -> EpisodeRecord:

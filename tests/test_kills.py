@@ -61,7 +61,12 @@ def test_it_ends_bit_for_bit_like_a_run_never_stopped(name: str, ends: dict[str,
     )
     for mine, yours in (
         (ours.agent.online.get_weights(), theirs.agent.online.get_weights()),
-        *zip(ours.agent.get_state().values(), theirs.agent.get_state().values(), strict=True),
+        *(
+            (mine.values(), yours.values())
+            for mine, yours in zip(
+                ours.agent.get_state().values(), theirs.agent.get_state().values(), strict=True
+            )
+        ),
         (ours.replay.get_state().values(), theirs.replay.get_state().values()),
     ):
         for array, other in zip(mine, yours, strict=True):
