@@ -1,12 +1,13 @@
 """What a study costs beyond its training, and what a second worker gains.
 
-    python -m benchmarks.study_cost [RUNS [EPISODES]]
+    python -m benchmarks.study_cost [ROUNDS [RUNS [EPISODES]]]
 
-Makes the same RUNS (8) runs of `reference` on one worker and on two, workers warm, as whole
-studies without the command: results are written and read like a user's. 8 runs of 500 episodes take
-three minutes on two cores. Beside it stands what the machine itself gives to two processes that do
-nothing but multiply matrices of an update's size: where its cores share what they compute with,
-no study can do better.
+Makes the same RUNS (4) runs of `reference` on one worker and on two, workers warm, as whole
+studies without the command: results are written and read like a user's. In turns, ROUNDS (5)
+times, because a shared machine is faster in one minute than in another; medians. With 500 episodes
+that takes eight minutes on two cores. Beside it stands what the machine itself gives to two
+processes that do nothing but multiply matrices of an update's size: where its cores share what they
+compute with, no study can do better.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from concurrent.futures import wait
 from pathlib import Path
 
 import keras_pendulum as kp
-from benchmarks.report import Row, write
+from benchmarks.report import Row, median, write
 from keras_pendulum.arms import Arm
 from keras_pendulum.study_folder import StudyFolder
 from keras_pendulum.study_loop import Engine, run_all
@@ -75,25 +76,28 @@ def measured(workers: int, runs: int, episodes: int) -> Row:
     return {
         "workers": workers,
         "runs": runs,
-        "seconds": round(seconds, 1),
-        "seeds per core-hour": round(3600 * runs / (seconds * workers)),
-        "efficiency": "",
-        "of bare matrix products": "",
-        "training (s a run)": round(training / runs, 2),
-        "evaluation (s a run)": round(evaluation / runs, 2),
-        "all else (s a run)": round((seconds * workers - training - evaluation) / runs, 3),
-        "of it in the worker (s a run)": round((inside - training - evaluation) / runs, 3),
-        "a worker's start (s, once)": round(start, 1),
+        "seconds": seconds,
+        "seeds per core-hour": 3600 * runs / (seconds * workers),
+        "efficiency": 0.0,  # against one worker in the same minute
+        "of bare matrix products": machine_efficiency(workers),
+        "training (s a run)": training / runs,
+        "evaluation (s a run)": evaluation / runs,
+        "all else (s a run)": (seconds * workers - training - evaluation) / runs,
+        "of it in the worker (s a run)": (inside - training - evaluation) / runs,
+        "a worker's start (s, once)": start,
     }
 
 
-def main(runs: int = 8, episodes: int = 500) -> None:
-    """Measures with one worker and with two, and writes the table."""
-    rows = [measured(workers, runs, episodes) for workers in (1, 2)]
-    for row in rows:
-        row["efficiency"] = round(rows[0]["seconds"] / (row["workers"] * row["seconds"]), 2)
-        row["of bare matrix products"] = round(machine_efficiency(row["workers"]), 2)
-    write("study_cost", f"python -m benchmarks.study_cost {runs} {episodes}", rows)
+def main(rounds: int = 5, runs: int = 4, episodes: int = 500) -> None:
+    """Measures with one worker and with two, in turns, and writes the table."""
+    pairs = [[measured(workers, runs, episodes) for workers in (1, 2)] for _ in range(rounds)]
+    for alone, both in pairs:
+        alone["efficiency"], both["efficiency"] = 1.0, alone["seconds"] / (2 * both["seconds"])
+    rows: list[Row] = [
+        {name: median([row[name] for row in column], 3) for name in column[0]}
+        for column in zip(*pairs, strict=True)
+    ]
+    write("study_cost", f"python -m benchmarks.study_cost {rounds} {runs} {episodes}", rows)
 
 
 if __name__ == "__main__":
