@@ -48,9 +48,9 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Computing is replaced by a quick stand-in; the list tells how many starts each call got."""
     counts: list[int] = []
 
-    def stand_in(gravity: float, states: Array) -> Array:
+    def stand_in(gravity: float, states: Array, steps: int) -> Array:
         counts.append(len(states))
-        return np.asarray(-gravity - np.abs(states[:, 0]))
+        return np.asarray(-gravity - np.abs(states[:, 0]) - 1 / steps)
 
     monkeypatch.setattr(optimum, "_best_return", stand_in)
     return counts
@@ -61,7 +61,7 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[Array]:
     """Nothing is searched; the list tells from which starts it would have been."""
     asked: list[Array] = []
 
-    def stand_in(table: NDArray[np.float32], gravity: float, start: Array) -> float:
+    def stand_in(table: NDArray[np.float32], gravity: float, start: Array, steps: int) -> float:
         asked.append(start)
         return -np.inf
 
@@ -74,23 +74,31 @@ def use_tables(monkeypatch: pytest.MonkeyPatch, tables: list[NDArray[np.float32]
 
     Coarse tables have more and wider cliffs than the fine one.
     """
-    monkeypatch.setattr(optimum, "solve", lambda gravity: tables[-1])
+    monkeypatch.setattr(optimum, "solve", lambda gravity, steps: tables[-1])
     monkeypatch.setattr(optimum, "value_tables", lambda gravity, cells: iter(tables))
 
 
 @pytest.mark.parametrize(
-    ("gravity", "count", "lowest", "highest"),
+    ("gravity", "steps", "count", "lowest", "highest"),
     [
-        (1, 100, -36.68 - 0.05, -36.68 + 0.05),
-        (1, 1000, -40.69 - 0.05, -40.69 + 0.05),
-        (10, 100, -132.7 - 0.05, -132.3),  # -132.7 was published, but two catches more are possible
-        (10, 1000, -135.5 - 0.3, -135.5 + 0.3),
+        (1, 200, 100, -36.68 - 0.05, -36.68 + 0.05),
+        (1, 200, 1000, -40.69 - 0.05, -40.69 + 0.05),
+        (10, 200, 100, -132.7 - 0.05, -132.3),  # -132.7 was published, but two catches more can be
+        (10, 200, 1000, -135.5 - 0.3, -135.5 + 0.3),
+        (10, 60, 100, -131.90, -131.88),  # these two are not published, but our own
+        (10, 60, 1000, -135.17, -135.15),
     ],
 )
 def test_shipped_returns_have_the_published_means(
-    gravity: float, count: int, lowest: float, highest: float, cache: Path, computed: list[int]
+    gravity: float,
+    steps: int,
+    count: int,
+    lowest: float,
+    highest: float,
+    cache: Path,
+    computed: list[int],
 ) -> None:
-    returns = optimal_return(gravity, range(count))
+    returns = optimal_return(gravity, range(count), steps)
     assert returns.dtype == np.float64
     assert returns.shape == (count,)
     assert lowest < returns.mean() < highest
@@ -98,17 +106,45 @@ def test_shipped_returns_have_the_published_means(
     assert not cache.exists()
 
 
-@pytest.mark.parametrize(("gravity", "each", "mean"), [(1.0, 0.02, 0.01), (10.0, 40.0, 1.0)])
+@pytest.mark.parametrize(
+    ("gravity", "steps", "each", "mean"),
+    [(1.0, 200, 0.02, 0.01), (10.0, 200, 40.0, 1.0), (10.0, 60, 40.0, 1.0)],
+)
 def test_shipped_returns_are_those_of_the_code_and_no_coarse_policy_beats_them(
-    gravity: float, each: float, mean: float
+    gravity: float, steps: int, each: float, mean: float
 ) -> None:
-    gain = optimal_return(gravity, range(100)) - greedy_return(
-        coarse_tables(gravity), gravity, starts(100)
+    gain = optimal_return(gravity, range(100), steps) - greedy_return(
+        coarse_tables(gravity)[:steps], gravity, starts(100)
     )
     assert gain.min() > -1e-6
     assert gain.max() < each  # at g = 10 a coarse policy misses whole catches
     assert gain.mean() < mean
     assert np.median(gain) < 0.3
+
+
+def test_short_episodes_lose_no_more_than_the_best_long_ones_in_as_many_steps() -> None:
+    short, long = (optimal_return(10.0, range(10_000), steps) for steps in (60, 200))
+    assert (short >= long).mean() > 0.99  # no step earns anything
+    assert (short[:1000] > long[:1000] - 0.2).all()
+    cut = greedy_return([coarse_tables(10.0)[-1]] * 60, 10.0, starts(1000))
+    assert (short[:1000] > cut - 0.2).all()
+    assert (short[:1000] > cut).mean() > 0.9
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_returns_of_one_and_two_steps_are_those_of_trying_all(steps: int) -> None:
+    env = pendulum(10.0)
+
+    def attained(start: Array, torques: list[float]) -> float:
+        env.state, env.last_u = start, None
+        return float(sum(env.step(np.array([torque]))[1] for torque in torques))
+
+    states = starts(20)
+    every = [
+        [*before, 0.0] for before in itertools.product(np.linspace(-2, 2, 41), repeat=steps - 1)
+    ]
+    best = [max(attained(start, torques) for torques in every) for start in states]
+    np.testing.assert_allclose(optimum._best_return(10.0, states, steps), best, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -126,13 +162,12 @@ def test_search_finds_what_the_greedy_policies_miss(monkeypatch: pytest.MonkeyPa
     states = starts(835)[[0, 34, 53, 93, 834]]  # V is too low at three and too high at the last
     at_start = greedy_return([tables[-1]] * 200, 10.0, states)
     best = np.maximum(at_start, greedy_return(tables, 10.0, states))
-    gain = optimum._best_return(10.0, states) - best
+    gain = optimum._best_return(10.0, states, 200) - best
     assert (gain >= 0).all()
     assert (gain > [-1, 0.5, 2, 10, 1]).all()
 
 
-def test_search_tries_every_torque_in_three_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(optimum, "STEPS_PER_EPISODE", 20)
+def test_search_tries_every_torque_in_three_steps() -> None:
     env, start = pendulum(10.0), np.array([2.5, 1.0])
 
     def attained(torques: list[float]) -> float:
@@ -147,14 +182,15 @@ def test_search_tries_every_torque_in_three_steps(monkeypatch: pytest.MonkeyPatc
         best.append(attained(path + [0.0] * (20 - len(path))))
     assert best[0] < best[1] - 1 < best[2] - 2
     nothing = np.zeros((3201, 101), np.float32)  # a policy greedy on it lets the pendulum swing
-    assert optimum._searched_return(nothing, 10.0, start) == pytest.approx(best[2], abs=1e-9)
+    assert optimum._searched_return(nothing, 10.0, start, 20) == pytest.approx(best[2], abs=1e-9)
+    assert optimum._searched_return(nothing, 10.0, start, 1) == pytest.approx(attained([0.0]))
 
 
 def test_where_value_and_attained_returns_agree_nothing_is_searched(
     monkeypatch: pytest.MonkeyPatch, searched: list[Array]
 ) -> None:
     use_tables(monkeypatch, [solve(1.0, theta_cells=200)] * 200)
-    gap = optimum._best_return(1.0, starts(100)) - optimal_return(1.0)
+    gap = optimum._best_return(1.0, starts(100), 200) - optimal_return(1.0)
     assert np.abs(gap).max() < 0.01
     assert not searched
 
@@ -165,8 +201,25 @@ def test_tables_of_each_step_serve_where_the_pendulum_cannot_be_stood_up(
     tables = coarse_tables(20.0)
     use_tables(monkeypatch, tables)
     at_start_only = greedy_return([tables[-1]] * 200, 20.0, starts(30)).mean()
-    assert optimum._best_return(20.0, starts(30)).mean() > at_start_only + 30
+    assert optimum._best_return(20.0, starts(30), 200).mean() > at_start_only + 30
     assert len(searched) < 5  # the search goes on with the other policy, the worse one here
+
+
+@pytest.mark.parametrize(("steps", "cells"), [(200, 100), (60, 333), (2, 1600)])
+def test_the_tables_of_fewer_steps_are_finer_in_the_same_memory(
+    steps: int, cells: int, monkeypatch: pytest.MonkeyPatch, searched: list[Array]
+) -> None:
+    asked: list[int] = []
+    nothing = np.zeros((3201, 101), np.float32)
+
+    def stand_in(gravity: float, theta_cells: int) -> Any:
+        asked.append(theta_cells)
+        return itertools.repeat(nothing)
+
+    monkeypatch.setattr(optimum, "solve", lambda gravity, steps: nothing)
+    monkeypatch.setattr(optimum, "value_tables", stand_in)
+    optimum._best_return(10.0, starts(1), steps)
+    assert asked == [cells]
 
 
 @pytest.mark.parametrize("gravity", [-0.1, 100.5, np.nan, np.inf, "heavy", None])
@@ -180,6 +233,12 @@ def test_bad_gravity_is_told_in_one_line(gravity: Any) -> None:
 def test_bad_seed_is_told(seed: int) -> None:
     with pytest.raises(ValueError, match=f"seed is {seed}; expected 0 to"):
         optimal_return(1.0, [seed])
+
+
+@pytest.mark.parametrize("steps", [-1, 0, 201])
+def test_bad_steps_are_told(steps: int) -> None:
+    with pytest.raises(ValueError, match=f"steps is {steps}; expected 1 to 200"):
+        optimal_return(1.0, [0], steps)
 
 
 def test_seeds_may_come_in_any_order_twice_and_not_at_all(cache: Path) -> None:
@@ -201,6 +260,15 @@ def test_returns_are_computed_once_and_new_seeds_join_them(
     optimal_return(1.0, np.array([5, 10_000]))
     assert computed == [1001, 1, 1]  # seed 5 came with the package
     assert sorted(path.name for path in cache.iterdir()) == ["gravity_1.npz", "gravity_9.81.npz"]
+
+
+def test_each_number_of_steps_has_a_file_of_its_own(cache: Path, computed: list[int]) -> None:
+    whole, short = (optimal_return(9.81, [3], steps)[0] for steps in (200, 60))
+    assert whole - short == pytest.approx(1 / 60 - 1 / 200)
+    assert [optimal_return(9.81, [3], steps)[0] for steps in (200, 60)] == [whole, short]
+    assert computed == [1000, 1000]
+    names = ["gravity_9.81.npz", "gravity_9.81_steps_60.npz"]
+    assert sorted(path.name for path in cache.iterdir()) == names
 
 
 def archive(**changes: Any) -> bytes:
@@ -237,6 +305,7 @@ def incomplete() -> bytes:
         archive(gravity=np.float64(9.8)),
         archive(gravity=np.array([9.81])),
         archive(gravity=np.array("9.81")),
+        archive(steps=np.int64(60)),
         archive(returns=np.full(1000, np.nan)),
         archive(returns=np.full(1000, -np.inf)),
         archive(returns=np.full(1000, 1.0)),
@@ -263,16 +332,36 @@ def test_damaged_or_foreign_cache_is_computed_anew(
     assert [path.name for path in cache.iterdir()] == ["gravity_9.81.npz"]
 
 
-def test_no_flipped_bit_is_read_as_another_return(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "content",
+    [
+        archive(),
+        archive(steps=np.int64(61)),
+        archive(steps=np.array([60])),
+        archive(steps=np.int64(60), returns=np.full(1000, -1000.0)),
+    ],
+)
+def test_cache_of_other_steps_is_computed_anew(
+    content: bytes, cache: Path, computed: list[int]
+) -> None:
+    cache.mkdir()
+    (cache / "gravity_9.81_steps_60.npz").write_bytes(content)
+    returns = optimal_return(9.81, range(5), 60)
+    assert ((returns < -9) & (returns > -13)).all()
+    assert computed == [1000]
+
+
+@pytest.mark.parametrize("steps", [60, 200])
+def test_no_flipped_bit_is_read_as_another_return(steps: int, tmp_path: Path) -> None:
     path = tmp_path / "gravity_9.81.npz"
     returns = {seed: -seed / 7 for seed in range(10)}
-    optimum._write(path, 9.81, returns)
+    optimum._write(path, 9.81, steps, returns)
     sound = path.read_bytes()
     for position in range(len(sound)):
         data = bytearray(sound)
         data[position] ^= 0x01
         path.write_bytes(data)
-        assert optimum._read(path, 9.81) in ({}, returns)
+        assert optimum._read(path, 9.81, steps) in ({}, returns)
 
 
 def test_unwritable_cache_folder_is_no_error(
@@ -291,11 +380,15 @@ def test_command_writes_the_files_that_ship(
     tmp_path: Path, computed: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert optimum.main(["1", "9.81", "--out", str(tmp_path)]) == 0
-    assert computed == [10_000, 10_000]
-    for gravity in (1.0, 9.81):
-        found = optimum._read(tmp_path / optimum._file_name(gravity), gravity)
+    assert optimum.main(["9.81", "--steps", "60", "--out", str(tmp_path)]) == 0
+    for gravity, steps in ((1.0, 200), (9.81, 200), (9.81, 60)):
+        path = tmp_path / optimum._file_name(gravity, steps)
+        found = optimum._read(path, gravity, steps)
         assert list(found) == list(range(10_000))
+        assert max(found.values()) == pytest.approx(-gravity - 1 / steps, abs=0.003)
     assert run_command(lambda: optimum.main(["-3", "--out", str(tmp_path)])) == 2
+    assert run_command(lambda: optimum.main(["1", "--steps", "0", "--out", str(tmp_path)])) == 2
+    assert computed == [10_000] * 3
     assert run_command(lambda: optimum.main(["1", "--out", str(tmp_path / "none")])) == 2
     assert "Traceback" not in capsys.readouterr().err
 

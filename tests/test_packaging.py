@@ -84,6 +84,7 @@ def test_wheel_holds_the_package_with_its_data_and_the_weights_and_no_more(built
         "keras_pendulum/py.typed",
         "keras_pendulum/optimal_values/gravity_1.npz",
         "keras_pendulum/optimal_values/gravity_10.npz",
+        "keras_pendulum/optimal_values/gravity_10_steps_60.npz",
         "keras_pendulum/shipped_weights/reference.h5",
     }
 
