@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.actions import make_actions
-from keras_pendulum.config import checked_setting
+from keras_pendulum.config import Config, checked_setting
 from keras_pendulum.environment import TASKS, make_environment
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.network import DQN
-from keras_pendulum.optimum import optimal_return
+from keras_pendulum.optimum import USUAL_SEEDS, optimal_return
 from keras_pendulum.policy import GreedyPolicy
 
 
@@ -135,10 +135,27 @@ def evaluate_policy(
     return Score(environment, gravity, np.array(returns), best)
 
 
+def best_training_return(config: Config) -> float:
+    """The best possible mean return of a training episode; NaN where that is not known.
+
+    It is known for the pendulum up to Gymnasium's own 200 steps. CartPole earns 1 a step.
+    """
+    if config.gravity is None:
+        return float(config.episode_steps)
+    if config.episode_steps > TASKS[config.environment].steps_per_episode:
+        return math.nan
+    return float(optimal_return(config.gravity, USUAL_SEEDS, config.episode_steps).mean())
+
+
 @cache
-def random_return(environment: str, gravity: float | None, episodes: int = 100) -> float:
-    """Mean return of uniformly random actions from the starts of seeds 0, 1, …: the floor."""
-    env = make_environment(environment, gravity)
+def random_return(
+    environment: str, gravity: float | None, steps: int, episodes: int = 100
+) -> float:
+    """Mean return of uniformly random actions from the starts of seeds 0, 1, …: the floor.
+
+    The episodes have `steps` steps at most.
+    """
+    env = make_environment(environment, gravity, steps=steps)
     actions = make_actions(environment, None)
     random = np.random.RandomState(0)
 

@@ -35,8 +35,8 @@ def finished_run(
     Args:
         history: at least one record.
         environment: which the episodes are of.
-        returns: mean returns of whole episodes to compare with, by name: `best possible`, and one
-            more at most; each a level line.
+        returns: mean returns of episodes as long as these to compare with, by name:
+            `best possible`, and one more at most; each a level line.
         planes: maps to set side by side, by name; may be empty.
 
     Returns:
@@ -92,10 +92,10 @@ def _draw_learning_curve(
     environment: str,
     returns: Mapping[str, float],
 ) -> None:
-    task = TASKS[environment]
-    if task.never_terminates:
+    if TASKS[environment].never_terminates:
         values = [record.average_reward for record in history]
-        levels = {name: level / task.steps_per_episode for name, level in returns.items()}
+        steps = history[-1].environment_steps / (history[-1].episode + 1)  # the same in each
+        levels = {name: level / steps for name, level in returns.items()}
         _draw_curve(axes, values, "Average reward per step", mean_over=10, levels=levels)
     else:  # where each step earns 1, the return is what differs
         values = [record.episode_return for record in history]

@@ -12,7 +12,6 @@ from statistics import fmean
 from typing import TYPE_CHECKING
 
 from keras_pendulum.config import Config
-from keras_pendulum.environment import TASKS
 
 if TYPE_CHECKING:
     from keras_pendulum.episodes import EpisodeRecord
@@ -33,7 +32,7 @@ class _Bar:
     """One line: return, regret, ε, loss, steps a second, and the time that is left.
 
     The regret is that of the last 10 training episodes, random actions included: the best possible
-    mean return less theirs. It is left out where the best possible one is of longer episodes.
+    mean return of episodes as long less theirs. Where that is not known, it is left out.
     """
 
     def __init__(self, config: Config) -> None:
@@ -45,7 +44,9 @@ class _Bar:
     def __call__(self, record: EpisodeRecord) -> None:
         """Shows one more episode."""
         if self._best is None:
-            self._best = _best_return(self._config)
+            from keras_pendulum.evaluation import best_training_return
+
+            self._best = best_training_return(self._config)
         self._last.append(record)
         done, total = record.episode + 1, self._config.episodes
         if time.monotonic() < self._shown + _SECONDS_BETWEEN and done < total:
@@ -77,15 +78,3 @@ class _Bar:
         left = round(seconds / len(last) * (self._config.episodes - record.episode - 1))
         figures.append(f"{left // 60}:{left % 60:02} left")
         return figures
-
-
-def _best_return(config: Config) -> float:
-    """The best possible mean return of a training episode; NaN where that is not known."""
-    task = TASKS[config.environment]
-    if config.episode_steps != task.steps_per_episode:
-        return math.nan
-    if config.gravity is None:
-        return task.steps_per_episode
-    from keras_pendulum.optimum import USUAL_SEEDS, optimal_return
-
-    return float(optimal_return(config.gravity, USUAL_SEEDS).mean())

@@ -159,7 +159,8 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
     if result.finished:
         score = evaluate_policy(result.network)
         print(score.summary())
-        chance = random_return(score.environment, score.gravity)
+        steps = TASKS[score.environment].steps_per_episode
+        chance = random_return(score.environment, score.gravity, steps)
         print(f"Uniformly random actions on the same starts: {chance:.2f}")
     saved = ", ".join(file.name for file in folder.files if file.exists())
     print(f"Saved in {folder.path}: {saved}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -11,12 +12,10 @@ from keras_pendulum import pictures
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 from keras_pendulum.config import Config
-from keras_pendulum.environment import TASKS
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import UserError
-from keras_pendulum.evaluation import random_return
+from keras_pendulum.evaluation import best_training_return, random_return
 from keras_pendulum.network import DQN
-from keras_pendulum.optimum import USUAL_SEEDS, optimal_return
 from keras_pendulum.phase_plane import beside_optimum
 from keras_pendulum.run import Run
 from keras_pendulum.run_folder import RunFolder
@@ -129,12 +128,9 @@ def _learn(
 
 
 def _levels(config: Config) -> dict[str, float]:
-    """Mean returns to compare a training episode's with, by name."""
-    task = TASKS[config.environment]
-    if config.episode_steps != task.steps_per_episode:
-        return {}  # they would not be of the same steps
-    best = float(task.steps_per_episode)  # CartPole's: 1 a step
-    if config.gravity is not None:
-        best = float(optimal_return(config.gravity, USUAL_SEEDS).mean())
-    chance = random_return(config.environment, config.gravity)
+    """Mean returns of episodes as long as a training one to compare it with, by name."""
+    best = best_training_return(config)
+    if math.isnan(best):
+        return {}
+    chance = random_return(config.environment, config.gravity, config.episode_steps)
     return {"best possible": best, "random actions": chance}

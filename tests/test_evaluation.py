@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.evaluation import random_return
+from keras_pendulum.evaluation import best_training_return, random_return
 from keras_pendulum.network import Origin
 from keras_pendulum.policy import GreedyPolicy
 
@@ -77,7 +77,32 @@ def test_no_policy_beats_the_best_possible_return() -> None:
 
 def test_random_torque_is_as_bad_as_published() -> None:
     # -909 at g = 1 over seeds 0…999; 100 of them stray by less than 10 %.
-    assert random_return("Pendulum-v1", 1.0) == pytest.approx(-909, rel=0.1)
+    assert random_return("Pendulum-v1", 1.0, 200) == pytest.approx(-909, rel=0.1)
+
+
+def test_random_episodes_have_the_steps_that_are_asked_for() -> None:
+    one_step = random_return("Pendulum-v1", 1.0, 1)
+    assert one_step == pytest.approx(-(np.pi**2 / 3 + 0.1 / 3 + 0.001 * 4 / 3), rel=0.2)
+    assert random_return("CartPole-v1", None, 5) == 5  # no start falls over so soon
+
+
+@pytest.mark.parametrize(
+    ("preset", "steps", "best"),
+    [
+        ("reference", 200, -40.69),
+        ("swingup", 60, -135.16),
+        ("swingup", 200, -135.5),
+        ("cartpole", 500, 500),
+        ("cartpole", 60, 60),
+        ("cartpole", 900, 900),
+        ("reference", 201, np.nan),
+    ],
+)
+def test_the_best_training_return_is_that_of_as_many_steps(
+    preset: str, steps: int, best: float
+) -> None:
+    found = best_training_return(kp.preset(preset, episode_steps=steps))
+    assert found == pytest.approx(best, abs=0.3 if steps == 200 else 0.01, nan_ok=True)
 
 
 @pytest.mark.parametrize(

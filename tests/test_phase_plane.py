@@ -76,7 +76,7 @@ def test_cartpole_has_no_such_maps() -> None:
 
 def test_the_figure_of_a_run_is_drawn_with_and_without_maps_and_losses() -> None:
     def record(episode: int, loss: float) -> EpisodeRecord:
-        return EpisodeRecord(episode, -1.0, -200.0, 0.5, loss, 200 * episode, episode, 0.1)
+        return EpisodeRecord(episode, -1.0, -200.0, 0.5, loss, 200 * (episode + 1), episode, 0.1)
 
     history = [record(i, math.nan if i < 5 else 1 / i) for i in range(30)]
     maps = {"one": of_network(kp.DQN((8,))), "two": of_optimum(1.0, 0.5)}
@@ -88,6 +88,20 @@ def test_the_figure_of_a_run_is_drawn_with_and_without_maps_and_losses() -> None
             sizes.append(matplotlib.image.imread(io.BytesIO(png)).shape[:2])
     assert sizes == [(1250, 900)] * 2 + [(600, 900)] * 2
     assert matplotlib.image.imread(io.BytesIO(pictures.phase_planes(maps))).shape[:2] == (650, 900)
+
+
+@pytest.mark.parametrize(
+    ("environment", "value", "best"), [("Pendulum-v1", -2, -0.5), ("CartPole-v1", -120, -30)]
+)
+def test_the_levels_are_on_the_scale_of_the_episodes(
+    environment: str, value: float, best: float
+) -> None:
+    history = [EpisodeRecord(i, -2.0, -120.0, 0.5, 0.1, 60 * (i + 1), i, 0.1) for i in range(3)]
+    axes = Figure().subplots()
+    pictures._draw_learning_curve(axes, history, environment, {"best possible": -30.0})
+    episodes, level = axes.get_lines()
+    assert list(np.asarray(episodes.get_ydata())) == [value] * 3
+    assert list(np.asarray(level.get_ydata())) == [best] * 2
 
 
 def test_a_level_does_not_lie_on_the_frame_of_the_learning_curve() -> None:

@@ -287,7 +287,8 @@ def test_resuming_with_other_settings_names_the_one_that_differs(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("preset", "best", "chance"), [("original", -40.69, -909), ("cartpole", 500, 20.6)]
+    ("preset", "best", "chance"),
+    [("original", -40.69, -909), ("swingup", -135.16, -370), ("cartpole", 500, 20.6)],
 )
 def test_the_picture_shows_the_best_possible_above_chance(
     preset: str, best: float, chance: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
