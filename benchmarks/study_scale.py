@@ -66,7 +66,7 @@ def measured(name: str, engine: Engine, runs: int, out: Path) -> Row:
     study_figure(rows, results)
     told = time.perf_counter()
     size = sum(path.stat().st_size for path in (out / name).rglob("*.json"))
-    return {
+    row = {
         "engine": name,
         "runs": len(folder.tasks()),
         "handed out and answered (runs/s)": round(runs / (handed - begun)),
@@ -76,6 +76,8 @@ def measured(name: str, engine: Engine, runs: int, out: Path) -> Row:
         "folder (MB)": round(size / 1e6, 1),
         "most memory (MB)": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3),
     }
+    print(row, flush=True)  # 100 000 runs take half an hour
+    return row
 
 
 def main(runs: int = 100_000, workers: int = 2) -> None:
