@@ -8,7 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
 from keras_pendulum.replay import ReplayBuffer
 from keras_pendulum.torque import TorqueGrid
+
+if TYPE_CHECKING:
+    import keras_pendulum as kp
 
 DATA = Path(__file__).parent / "data"
 Recorded = dict[str, NDArray[Any]]
@@ -121,3 +124,17 @@ def refusal(
 def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]:
     """The words that start a command of the package in this interpreter."""
     return [sys.executable, "-m", f"keras_pendulum.{name}", *map(str, arguments)]
+
+
+def comparable(result: kp.TrainingResult) -> list[tuple[float, ...]]:
+    """The history but for its wall-clock times."""
+    return [
+        tuple(-1.0 if np.isnan(value) else value for value in record[:-1])
+        for record in result.history
+    ]
+
+
+def assert_same(ours: kp.TrainingResult, theirs: kp.TrainingResult) -> None:
+    assert comparable(ours) == comparable(theirs)
+    for mine, yours in zip(ours.network.get_weights(), theirs.network.get_weights(), strict=True):
+        np.testing.assert_array_equal(mine, yours)

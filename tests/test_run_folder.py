@@ -1,0 +1,194 @@
+"""What a run keeps in its folder, and what it does not do to another run's."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.atomic_file import write_atomically
+from keras_pendulum.checkpoint import (
+    CheckpointWriter,
+    load_checkpoint,
+    save_checkpoint,
+)
+from keras_pendulum.run_folder import RunFolder
+
+
+def test_a_run_leaves_its_four_files(tmp_path: Path) -> None:
+    config = kp.preset("reference", episodes=46)
+    result = kp.train_dqn(config, tmp_path / "new" / "folder")
+    folder = tmp_path / "new" / "folder"
+    assert {file.name for file in folder.iterdir()} == {
+        "pendulum_weight.h5",
+        "history.csv",
+        "config.json",
+        "rewards.png",
+    }
+    written = json.loads((folder / "config.json").read_text())
+    assert kp.Config(**{**written, "hidden_units": tuple(written["hidden_units"])}) == config
+
+    with open(folder / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert ",".join(rows[0]) == (
+        "episode,average_reward,return,epsilon,loss,environment_steps,updates,seconds"
+    )
+    assert len(rows) == 46
+    assert [float(row["return"]) for row in rows] == [r.episode_return for r in result.history]
+    assert rows[40]["loss"] == ""
+    assert float(rows[41]["loss"]) > 0
+    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "110")
+
+    picture = matplotlib.image.imread(folder / "rewards.png")
+    assert picture.shape[0] > 300
+    assert picture[..., :3].std() > 0.05  # something is drawn
+
+
+def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=24, hidden_units=(8,))
+    contents: list[bytes] = []
+
+    def write(path: Path, *parts: bytes) -> None:
+        contents.append(b"".join(parts))
+        write_atomically(path, *parts)
+
+    monkeypatch.setattr("keras_pendulum.integrity.write_atomically", write)
+    kp.train_dqn(config, tmp_path / "run")
+    assert (tmp_path / "run" / "pendulum_weight.h5").read_bytes() == contents[-1]
+    episodes = []
+    for content in contents:
+        (tmp_path / "one.h5").write_bytes(content)
+        episodes.append(len(load_checkpoint(tmp_path / "one.h5", config).history))
+    assert episodes == [0, 1, 11, 21, 24]
+
+
+def full_disk(descriptor: int) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def fill_disk_after(files: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    left = iter(range(files))
+    fsync = os.fsync
+    monkeypatch.setattr(
+        "keras_pendulum.atomic_file.os.fsync",
+        lambda file: full_disk(file) if next(left, None) is None else fsync(file),
+    )
+
+
+def test_a_checkpoint_that_fails_beside_the_run_ends_it_and_the_last_good_one_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=40, hidden_units=(8,))
+    seen: list[Any] = []
+    # The checkpoints before the first episode and of episodes 0 and 10, settings and history.
+    fill_disk_after(5, monkeypatch)
+    with pytest.raises(kp.UserError, match=r"cannot write .*No space left"):
+        kp.train_dqn(config, tmp_path, listeners=[seen.append])
+    assert seen[-1].episode == 29  # the checkpoint of episode 20 failed, that of 30 is told
+    monkeypatch.undo()
+    assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 11
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_a_last_checkpoint_that_fails_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill_disk_after(4, monkeypatch)
+    with pytest.raises(kp.UserError, match=r"cannot write .*pendulum_weight\.h5: No space left"):
+        kp.train_dqn(kp.preset("original", episodes=2, hidden_units=(8,)), tmp_path)
+
+
+def test_a_used_folder_is_not_overwritten_unless_asked(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(kp.UserError, match=r"already holds a run.*--resume.*--overwrite"):
+        kp.train_dqn(config, tmp_path)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+    kp.train_dqn(kp.preset("original", episodes=3, hidden_units=(8,)), tmp_path, overwrite=True)
+    assert len((tmp_path / "history.csv").read_text().splitlines()) == 4
+
+
+def test_a_run_of_another_environment_is_replaced_only_when_the_new_one_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pendulum = kp.preset("original", episodes=2, hidden_units=(8,))
+    cartpole = kp.preset("cartpole-original", episodes=2)
+    kp.train_dqn(pendulum, tmp_path)
+    with pytest.raises(kp.UserError, match=r"already holds a run .*pendulum_weight\.h5"):
+        kp.train_dqn(cartpole, tmp_path)
+    policy = (tmp_path / "pendulum_weight.h5").read_bytes()
+    with monkeypatch.context() as patched:
+        patched.setattr("keras_pendulum.atomic_file.os.fsync", full_disk)
+        with pytest.raises(kp.UserError, match="cannot write"):
+            kp.train_dqn(cartpole, tmp_path, overwrite=True)
+    assert (tmp_path / "pendulum_weight.h5").read_bytes() == policy
+    kp.train_dqn(cartpole, tmp_path, overwrite=True)
+    assert not (tmp_path / "pendulum_weight.h5").exists()
+    assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
+
+
+def test_two_runs_do_not_share_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    # At once, for a look at the folder as it stands.
+    monkeypatch.setattr(
+        CheckpointWriter, "save", lambda writer, run: save_checkpoint(run, writer.path)
+    )
+
+    def another(record: object) -> None:
+        before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+        for overwrite, resume in ((True, False), (False, True), (False, False)):
+            with pytest.raises(kp.UserError, match="another run is going on in"):
+                kp.train_dqn(config, tmp_path, overwrite=overwrite, resume=resume)
+        assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+    kp.train_dqn(config, tmp_path, listeners=[another])
+    kp.train_dqn(config, tmp_path, overwrite=True)
+
+
+def test_what_a_killed_run_left_half_written_goes(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    (tmp_path / ".pendulum_weight.h5.0123456789abcdef.tmp").touch()
+    (tmp_path / "mine.tmp").touch()
+    kp.train_dqn(config, tmp_path, resume=True)
+    assert [file.name for file in tmp_path.glob("*.tmp")] == ["mine.tmp"]
+
+
+def test_of_two_checkpoints_the_newer_one_goes_on(tmp_path: Path) -> None:
+    for name, age in (("pendulum_weight.h5", 10), ("cartpole_weight.h5", 20)):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (age, age))
+    assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
+    os.utime(tmp_path / "pendulum_weight.h5", (30, 30))
+    assert RunFolder(tmp_path).weights.name == "pendulum_weight.h5"
+
+
+@pytest.mark.parametrize(
+    ("preset", "best", "chance"),
+    [("original", -40.69, -909), ("swingup", -135.16, -370), ("cartpole", 500, 20.6)],
+)
+def test_the_picture_shows_the_best_possible_above_chance(
+    preset: str, best: float, chance: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[float, float]] = []
+
+    def draw(history: Any, environment: str, returns: dict[str, float], planes: Any) -> bytes:
+        assert list(returns) == ["best possible", "random actions"]
+        drawn.append((returns["best possible"], returns["random actions"]))
+        return b"a picture"
+
+    monkeypatch.setattr("keras_pendulum.pictures.finished_run", draw)
+    kp.train_dqn(kp.preset(preset, episodes=1, hidden_units=(8,)), tmp_path)
+    assert (tmp_path / "rewards.png").read_bytes() == b"a picture"
+    assert len(drawn) == 1
+    assert drawn[0][0] == pytest.approx(best, abs=0.05)
+    assert drawn[0][1] == pytest.approx(chance, rel=0.1)
