@@ -12,6 +12,7 @@ for all but five of them, to 0.3 for those, and to 0.003 in the mean. Without th
 and 657 would be 17 and 23 short at g = 10, and the mean of the seeds 0 to 99 -132.54, not -132.37.
 In the 60 steps of the preset `swingup`, at g = 10: to 0.1 for all but 11, to 0.9 for those, and to
 0.005 in the mean, -135.16, against all steps greedy on fine tables of their own, searched too.
+Of the seeds beyond, 38 are below their own return of 200 steps, the worst, 8105, by 4.1.
 
 The returns for the seeds 0 to 9999 come with the package for g = 1 and g = 10, and for g = 10 also
 those of 60 steps, written by
