@@ -10,7 +10,7 @@ import numpy as np
 import tensorflow as tf
 from numpy.typing import NDArray
 
-from keras_pendulum.flat_variables import FlatVariables
+from keras_pendulum.flat_variables import Arrays, FlatVariables
 from keras_pendulum.network import DQN
 from keras_pendulum.policy import GreedyPolicy
 from keras_pendulum.q_learning import double_td_target, td_target
@@ -55,13 +55,12 @@ class Agent:
         self.double_q = double_q
         self.random = random
         optimizer.build(online.trainable_variables)
-        self._state = {
-            "target": FlatVariables(target.weights),
-            "optimizer": FlatVariables(optimizer.variables),
-        }
+        self._variables = FlatVariables(
+            online=online.weights, target=target.weights, optimizer=optimizer.variables
+        )
         # By the shapes of what goes in, which stay the same during a run.
-        self._compiled: dict[tuple[int, ...], Callable[..., tuple[tf.Tensor, tf.Tensor]]] = {}
-        # What there is to act on since the last update: a copy of the weights, or one observation
+        self._compiled: dict[tuple[int, ...], Callable[..., tuple[tf.Tensor, Any]]] = {}
+        # What there is to act on since the last update: copies of the weights, or one observation
         # with its Q-values [A].
         self._greedy: GreedyPolicy | None = None
         self._valued: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
@@ -72,9 +71,13 @@ class Agent:
             return self.random.action(self.online.action_count)
         if self._valued is not None and self._valued[0] is observation:
             return int(self._valued[1].argmax())
+        return self.policy().action(observation)
+
+    def policy(self) -> GreedyPolicy:
+        """The greedy policy of the weights since the last update."""
         if self._greedy is None:
             self._greedy = GreedyPolicy(self.online)
-        return self._greedy.action(observation)
+        return self._greedy
 
     def update(
         self, batches: Transitions, observation: NDArray[np.float32] | None = None
@@ -82,8 +85,8 @@ class Agent:
         """Learns from batches [K, B, ...], one after the other; returns the losses [K].
 
         One compiled call makes all K updates, because a call each costs more than its update. It
-        also values `observation` [D], when given, the one to act on next: where an update comes
-        after each step, a copy of the weights would be for a single use.
+        also gives what to act on next: the weights, or the values of `observation` [D], where an
+        update comes after each step and a copy of the weights would be for a single use.
         """
         rows = _packed(batches)
         valued = _NOTHING if observation is None else observation
@@ -94,16 +97,20 @@ class Agent:
             self._compiled[shapes] = function.get_concrete_function(
                 tf.TensorSpec(rows.shape), tf.TensorSpec(valued.shape)
             )
-        losses, q = self._compiled[shapes](tf.constant(rows), tf.constant(valued))
-        self._greedy = None
-        self._valued = None if observation is None else (observation, q.numpy())
+        losses, found = self._compiled[shapes](tf.constant(rows), tf.constant(valued))
+        self._greedy = self._valued = None
+        if observation is None:
+            self._greedy = GreedyPolicy(self.online, [each.numpy() for each in found])
+        else:
+            self._valued = (observation, found.numpy())
         return losses.numpy()
 
-    def _updates(self, rows: tf.Tensor, observation: tf.Tensor) -> tuple[tf.Tensor, tf.Tensor]:
+    def _updates(self, rows: tf.Tensor, observation: tf.Tensor) -> tuple[tf.Tensor, Any]:
         batches = _unpacked(rows)
         losses = tf.scan(lambda _, batch: self.learn(batch), batches, initializer=0.0)  # [K]
         if observation.shape == _NOTHING.shape:
-            return losses, observation
+            # Reading them in calls of their own takes as long as an update.
+            return losses, [each.value.read_value() for each in self.online.weights]
         return losses, self.online(observation[tf.newaxis])[0]  # [K], [A]
 
     def learn(self, batch: Transitions) -> tf.Tensor:
@@ -124,22 +131,15 @@ class Agent:
         self.update_target(self.online, self.target, self.optimizer.iterations)
         return loss
 
-    def get_state(self) -> dict[str, dict[str, NDArray[Any]]]:
-        """Copies of the target's weights and the optimizer's variables, as FlatVariables has them.
+    def get_state(self) -> tuple[list[NDArray[Any]], dict[str, Arrays]]:
+        """The online weights, and target and optimizer as FlatVariables has them; all read-only."""
+        state = self._variables.read()
+        return self._variables.split("online", state.pop("online")), state
 
-        The online weights are not among them: they are the policy, kept by `weights`.
-        """
-        return {name: variables.read() for name, variables in self._state.items()}
-
-    def set_state(
-        self, online: list[NDArray[Any]], state: dict[str, dict[str, NDArray[Any]]]
-    ) -> None:
-        """Goes on from online weights and a state of `get_state`.
-
-        Raises ValueError when they do not fit.
-        """
-        for name, variables in self._state.items():
-            variables.write(state[name])
+    def set_state(self, online: list[NDArray[Any]], state: dict[str, Arrays]) -> None:
+        """Goes on from what `get_state` gave. Raises ValueError when it does not fit."""
+        for name in ("target", "optimizer"):
+            self._variables.write(name, state[name])
         self.online.set_weights(online)
         self._greedy = self._valued = None
 

@@ -16,11 +16,10 @@ from keras_pendulum import layer_files
 from keras_pendulum.config import Config
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import ConfigError, WeightsError
+from keras_pendulum.flat_variables import Arrays
 from keras_pendulum.integrity import write_sealed
 from keras_pendulum.run import Run
 from keras_pendulum.weights import require_finite, weights_file
-
-_AgentState = dict[str, dict[str, NDArray[Any]]]
 
 # A resumed run may be made longer or saved at other times; anything else would be another run.
 _MAY_CHANGE = {"episodes", "save_every"}
@@ -70,15 +69,15 @@ class CheckpointWriter:
             self._wait()
 
 
-def _write(path: str | os.PathLike[str], content: bytes, agent: _AgentState) -> None:
+def _write(path: str | os.PathLike[str], content: bytes, agent: dict[str, Arrays]) -> None:
     for arrays in agent.values():
         require_finite(arrays.values())
     write_sealed(path, content)
 
 
-def _snapshot(run: Run) -> tuple[bytes, _AgentState]:
+def _snapshot(run: Run) -> tuple[bytes, dict[str, Arrays]]:
     """A checkpoint's content, and what of it has still to be checked."""
-    agent = run.agent.get_state()
+    online, agent = run.agent.get_state()
     state = {
         "config": asdict(run.config),
         "random": run.random.get_state(),
@@ -87,6 +86,7 @@ def _snapshot(run: Run) -> tuple[bytes, _AgentState]:
     }
     content = weights_file(
         run.agent.online,
+        online,
         target=agent["target"],
         optimizer=agent["optimizer"],
         replay=run.replay.get_state(),

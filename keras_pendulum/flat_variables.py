@@ -6,6 +6,7 @@ what it reads (benchmarks/saving.py).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -15,41 +16,61 @@ import numpy as np
 import tensorflow as tf
 from numpy.typing import NDArray
 
+Arrays = dict[str, NDArray[Any]]  # [N] for each type, by its name
+
 
 class FlatVariables:
-    """Reads and writes variables of any shapes, one after the other, by type."""
+    """Reads and writes groups of variables of any shapes, one after the other, by type."""
 
-    def __init__(self, variables: Sequence[keras.Variable]) -> None:
-        types = dict.fromkeys(variable.value.dtype.name for variable in variables)
-        self._by_type = {
-            name: [each for each in variables if each.value.dtype.name == name] for name in types
+    def __init__(self, **groups: Sequence[keras.Variable]) -> None:
+        self._groups = groups
+
+    def read(self) -> dict[str, Arrays]:
+        """The numbers of each group as they are now, not to be changed."""
+        # The new tensors' own memory; `numpy()` would copy it once more.
+        return {
+            group: {name: np.asarray(memoryview(numbers)) for name, numbers in tensors.items()}
+            for group, tensors in self._join().items()
         }
-
-    def read(self) -> dict[str, NDArray[Any]]:
-        """Copies of their numbers: an array [N] for each type, by its name."""
-        return {name: numbers.numpy() for name, numbers in self._join().items()}
 
     @cached_property
     def _join(self) -> Any:
-        def join() -> dict[str, tf.Tensor]:
-            return {
-                name: tf.concat([tf.reshape(each.value, [-1]) for each in variables], 0)
-                for name, variables in self._by_type.items()
-            }
+        def join() -> dict[str, dict[str, tf.Tensor]]:
+            joined: dict[str, dict[str, tf.Tensor]] = {}
+            for group, variables in self._groups.items():
+                parts: dict[str, list[tf.Tensor]] = {}
+                for variable in variables:
+                    part = tf.reshape(variable.value, [-1])
+                    parts.setdefault(_type(variable), []).append(part)
+                joined[group] = {name: tf.concat(each, 0) for name, each in parts.items()}
+            return joined
 
         return tf.function(join, autograph=False).get_concrete_function()
 
-    def write(self, arrays: dict[str, NDArray[Any]]) -> None:
-        """Sets them to arrays of `read`. Raises ValueError when those do not fit."""
-        sizes = {
-            name: [int(np.prod(each.shape)) for each in variables]
-            for name, variables in self._by_type.items()
-        }
-        wanted = {name: (sum(counts),) for name, counts in sizes.items()}
+    def split(self, group: str, arrays: Arrays) -> list[NDArray[Any]]:
+        """What each variable of a group has in arrays of `read`, in its shape.
+
+        Raises ValueError when the arrays do not fit the group.
+        """
+        wanted: dict[str, tuple[int, ...]] = {}
+        places = []
+        for variable in self._groups[group]:
+            name, shape = _type(variable), tuple(variable.shape)
+            (start,) = wanted.get(name, (0,))
+            end = start + math.prod(shape)
+            wanted[name] = (end,)
+            places.append((name, start, end, shape))
         found = {name: array.shape for name, array in arrays.items()}
         if found != wanted:
             raise ValueError(f"has numbers {found} for variables {wanted}")
-        for name, variables in self._by_type.items():
-            parts = np.split(arrays[name], np.cumsum(sizes[name])[:-1])
-            for variable, part in zip(variables, parts, strict=True):
-                variable.assign(part.reshape(variable.shape))
+        return [arrays[name][start:end].reshape(shape) for name, start, end, shape in places]
+
+    def write(self, group: str, arrays: Arrays) -> None:
+        """Sets a group to arrays of `read`. Raises ValueError when those do not fit."""
+        for variable, part in zip(self._groups[group], self.split(group, arrays), strict=True):
+            variable.assign(part)
+
+
+def _type(variable: keras.Variable) -> str:
+    name: str = variable.value.dtype.name
+    return name

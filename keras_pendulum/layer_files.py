@@ -11,16 +11,18 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from h5py import h5f
+from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum import integrity, structure
 from keras_pendulum.errors import UserError, WeightsError
+from keras_pendulum.hdf5_writer import add_arrays, add_attributes, add_group
 
 _LARGEST_FILE = 2**30  # bytes; a checkpoint of `reference` has 4.5 MB
 _LARGEST_LAYER = 8192  # units
@@ -128,28 +130,22 @@ def read_array(dataset: Any, path: str | os.PathLike[str], *, finite: bool = Tru
     return array
 
 
-def write_layers(file: h5py.File, arrays: list[NDArray[np.float32]]) -> None:
+def write_layers(file: h5f.FileID, arrays: list[NDArray[np.float32]]) -> None:
     """Writes kernel, bias, kernel, bias, … in the layout of Keras 2's `save_weights`."""
     names = ["dense" if i == 0 else f"dense_{i}" for i in range(len(arrays) // 2)]
-    file.attrs["backend"] = np.bytes_("tensorflow")
-    file.attrs["keras_version"] = np.bytes_("2.15.0")  # the version whose layout this is
-    file.attrs["layer_names"] = np.array(names, "S")
+    about: dict[str, ArrayLike] = {
+        "backend": b"tensorflow",
+        "keras_version": b"2.15.0",  # the version whose layout this is
+        "layer_names": np.array(names, "S"),
+    }
+    add_attributes(file, about)
     for name, kernel, bias in zip(names, arrays[::2], arrays[1::2], strict=True):
-        group = file.create_group(name)
-        group.attrs["weight_names"] = np.array([f"{name}/kernel:0", f"{name}/bias:0"], "S")
-        write_arrays(group.create_group(name), {"kernel:0": kernel, "bias:0": bias})
-    file.create_group("top_level_model_weights").attrs["weight_names"] = np.array([], "S1")
-
-
-def write_arrays(group: h5py.Group, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Writes arrays into a group, by name."""
-    for name, array in arrays.items():
-        # What `create_dataset` comes down to; a checkpoint is made in the middle of a run, and that
-        # takes twice as long (benchmarks/saving.py).
-        kind = h5py.h5t.py_create(array.dtype, logical=True)
-        space = h5py.h5s.create_simple(array.shape)
-        dataset = h5py.h5d.create(group.id, name.encode(), kind, space)
-        dataset.write(h5py.h5s.ALL, h5py.h5s.ALL, np.ascontiguousarray(array))
+        layer = add_group(file, name)
+        parts = np.array([f"{name}/kernel:0", f"{name}/bias:0"], "S")
+        add_attributes(layer, {"weight_names": parts})
+        add_arrays(add_group(layer, name), {"kernel:0": kernel, "bias:0": bias})
+    nothing = np.array([], "S1")
+    add_attributes(add_group(file, "top_level_model_weights"), {"weight_names": nothing})
 
 
 def _keras2_layers(root: h5py.Group) -> list[_Layer]:

@@ -15,7 +15,7 @@ from keras_pendulum.phase_plane import EXTENT, PhasePlane
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import GridSpecBase
+    from matplotlib.gridspec import GridSpec, SubplotSpec
 
     from keras_pendulum.episodes import EpisodeRecord
 
@@ -44,8 +44,8 @@ def finished_run(
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 12.5 if planes else 6), layout="constrained")
-    grid = figure.add_gridspec(4 if planes else 2, 2)
+    figure = Figure(figsize=(9, 12.5 if planes else 6))
+    grid = _grid(figure, 4 if planes else 2, 2)
     _draw_learning_curve(figure.add_subplot(grid[0, :]), history, environment, returns)
     epsilon, loss = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
     episodes = [record.episode for record in history]
@@ -57,7 +57,7 @@ def finished_run(
     if any(value > 0 for value in losses):
         loss.set_yscale("log")
     if planes:
-        _draw_planes(figure, grid[2:, :].subgridspec(2, len(planes)), planes)
+        _draw_planes(figure, grid[2:, :], planes)
     return _png(figure)
 
 
@@ -65,8 +65,8 @@ def phase_planes(planes: Mapping[str, PhasePlane]) -> bytes:
     """Greedy torque and value over the phase plane, one column for each policy: a PNG."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 6.5), layout="constrained")
-    _draw_planes(figure, figure.add_gridspec(2, len(planes)), planes)
+    figure = Figure(figsize=(9, 6.5))
+    _draw_planes(figure, _grid(figure, 1, 1)[0], planes)
     return _png(figure)
 
 
@@ -81,9 +81,28 @@ def live_curve(returns: Sequence[float]) -> bytes:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.6, 5.4), layout="constrained")
-    _draw_curve(figure.subplots(), returns, "Return", mean_over=100, levels={})
+    figure = Figure(figsize=(9.6, 5.4))
+    axes = figure.add_subplot(_grid(figure, 1, 1)[0])
+    _draw_curve(axes, returns, "Return", mean_over=100, levels={})
     return _png(figure)
+
+
+def _grid(figure: Figure, rows: int, columns: int) -> GridSpec:
+    """Places for axes with their labels.
+
+    Matplotlib's own layout engines find them too, but draw a figure twice for it.
+    """
+    width, height = figure.get_size_inches()
+    return figure.add_gridspec(
+        rows,
+        columns,
+        left=0.75 / width,
+        right=1 - 0.2 / width,
+        bottom=0.55 / height,
+        top=1 - 0.4 / height,
+        wspace=0.24,
+        hspace=0.36,
+    )
 
 
 def _draw_learning_curve(
@@ -125,7 +144,7 @@ def _draw_curve(
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, frameon=False)
 
 
-def _draw_planes(figure: Figure, grid: GridSpecBase, planes: Mapping[str, PhasePlane]) -> None:
+def _draw_planes(figure: Figure, place: SubplotSpec, planes: Mapping[str, PhasePlane]) -> None:
     """Torques in the upper row and values in the lower one, each row on one scale.
 
     Both colour maps grow lighter all the way, so that they can be read in black and white.
@@ -134,6 +153,7 @@ def _draw_planes(figure: Figure, grid: GridSpecBase, planes: Mapping[str, PhaseP
         "torque": ("Greedy torque (N·m)", "cividis"),
         "value": ("Value (discounted reward to come)", "viridis"),
     }
+    grid = place.subgridspec(2, len(planes), wspace=0.28, hspace=0.4)
     for row, (part, (label, colors)) in enumerate(rows.items()):
         maps = {name: getattr(plane, part) for name, plane in planes.items()}
         shown = np.stack(list(maps.values()))
@@ -152,7 +172,7 @@ def _draw_planes(figure: Figure, grid: GridSpecBase, planes: Mapping[str, PhaseP
             axes.set_xticks([-np.pi, 0, np.pi], ["-π", "0 (upright)", "π"])
             axes.set(title=name, xlabel="θ (rad)", ylabel="θ̇ (rad/s)")
             drawn.append(axes)
-        figure.colorbar(image, ax=drawn, label=label)
+        figure.colorbar(image, ax=drawn, label=label, fraction=0.1, pad=0.03)
 
 
 def _png(figure: Figure) -> bytes:

@@ -20,11 +20,16 @@ ACTIVATIONS: dict[str, Callable[..., Any]] = {"tanh": np.tanh, "relu": _relu}
 
 
 class GreedyPolicy:
-    """The greedy policy of a network's weights as they are now; later changes do not reach it."""
+    """The greedy policy of a network's weights as they are now; later changes do not reach it.
 
-    def __init__(self, network: Any) -> None:
+    Args:
+        network: a DQN.
+        weights: copies of its weights, where they are at hand.
+    """
+
+    def __init__(self, network: Any, weights: list[NDArray[np.float32]] | None = None) -> None:
         # get_weights hands out copies.
-        weights = network.get_weights()
+        weights = weights or network.get_weights()
         self._hidden = list(zip(weights[:-2:2], weights[1:-2:2], strict=True))
         self._head = weights[-2:]
         self._activate = ACTIVATIONS[network.activation]

@@ -21,6 +21,7 @@ from keras_pendulum import __version__, layer_files
 from keras_pendulum.config import checked_setting
 from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import ConfigError, UserError, WeightsError
+from keras_pendulum.hdf5_writer import add_arrays, add_attributes, add_group, file_in_memory, image
 from keras_pendulum.integrity import write_sealed
 from keras_pendulum.network import DQN, Origin
 from keras_pendulum.policy import ACTIVATIONS
@@ -45,40 +46,41 @@ def save_weights(
     Raises:
         UserError: the file cannot be written, or a weight is not finite.
     """
-    write_sealed(path, weights_file(network, evaluated_return=evaluated_return))
+    weights = network.get_weights()
+    write_sealed(path, weights_file(network, weights, evaluated_return=evaluated_return))
 
 
 def weights_file(
-    network: DQN, *, evaluated_return: float | None = None, **groups: dict[str, NDArray[Any]]
+    network: DQN,
+    weights: list[NDArray[np.float32]],
+    *,
+    evaluated_return: float | None = None,
+    **groups: dict[str, NDArray[Any]],
 ) -> bytes:
     """The network's `.h5`, without its digest, with further groups of arrays beside the layers.
 
     Raises UserError when a weight is not finite: such a network is no policy.
     """
-    weights = network.get_weights()
     require_finite(weights)
-    # In memory, a megabyte at a time; nothing is written to the disk.
-    with h5py.File("weights", "w", driver="core", backing_store=False, block_size=2**23) as file:
+    about = {
+        "version": __version__,
+        "versions": json.dumps(_versions()),
+        "activation": network.activation,
+        "environment": network.origin.environment,
+        **{name: getattr(network.origin, name) for name in _OPTIONAL},
+        "evaluated_return": evaluated_return,
+    }
+    attributes = {
+        name: value.encode() if isinstance(value, str) else value
+        for name, value in about.items()
+        if value is not None
+    }
+    with file_in_memory() as file:
         layer_files.write_layers(file, weights)
-        about = {
-            "version": __version__,
-            "versions": json.dumps(_versions()),
-            "activation": network.activation,
-            "environment": network.origin.environment,
-            **{name: getattr(network.origin, name) for name in _OPTIONAL},
-            "evaluated_return": evaluated_return,
-        }
-        attributes = file.create_group(_ORIGIN).attrs
-        for name, value in about.items():
-            if value is not None:
-                # Of fixed length: HDF5's other texts are pointers into a heap that no reader can
-                # bound.
-                attributes[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
+        add_attributes(add_group(file, _ORIGIN), attributes)
         for name, arrays in groups.items():
-            layer_files.write_arrays(file.create_group(name), arrays)
-        file.flush()
-        image: bytes = file.id.get_file_image()
-    return image
+            add_arrays(add_group(file, name), arrays)
+        return image(file)
 
 
 def require_finite(arrays: Iterable[NDArray[Any]]) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.policy import GreedyPolicy
 from keras_pendulum.run import Run
 
 
@@ -25,3 +26,19 @@ def test_it_explores_when_the_draw_is_at_most_epsilon(
     assert asked == ([41] if explores else [])
     greedy = int(agent.online(observation[np.newaxis]).numpy().argmax())
     assert action == (7 if explores else greedy)
+
+
+def test_after_an_update_it_acts_on_the_new_weights_and_keeps_them_until_the_next() -> None:
+    run = Run(kp.preset("reference", hidden_units=(8,)))
+    random = np.random.RandomState(0)
+    for _ in range(4):
+        run.replay.add(random.randn(3), 1, -1.0, random.randn(3), False)
+    batches = run.replay.at([[0, 1], [2, 3]])
+    observation = np.array([1, 0, 0], np.float32)
+    run.agent.update(batches)
+    acting = run.agent.policy()
+    values = GreedyPolicy(run.agent.online).q_values(observation)
+    np.testing.assert_array_equal(acting.q_values(observation), values)
+    run.agent.update(batches)
+    np.testing.assert_array_equal(acting.q_values(observation), values)
+    assert (run.agent.policy().q_values(observation) != values).any()

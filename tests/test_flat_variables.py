@@ -19,8 +19,7 @@ def variables() -> list[keras.Variable]:
 
 
 def test_they_are_read_one_after_the_other_by_type() -> None:
-    flat = FlatVariables(variables())
-    arrays = flat.read()
+    arrays = FlatVariables(some=variables()).read()["some"]
     assert {name: (array.dtype.name, array.tolist()) for name, array in arrays.items()} == {
         "float32": ("float32", [1, 2, 3, 4, 5, 6]),
         "int64": ("int64", [7]),
@@ -29,15 +28,22 @@ def test_they_are_read_one_after_the_other_by_type() -> None:
 
 def test_what_was_read_is_a_copy_and_can_be_written_back() -> None:
     ours = variables()
-    flat = FlatVariables(ours)
-    before = flat.read()
+    flat = FlatVariables(ours=ours, theirs=variables())
+    before = flat.read()["ours"]
     ours[0].assign([[9.0, 9.0], [9.0, 9.0]])
     ours[1].assign(8)
-    assert flat.read()["float32"].tolist() == [9, 9, 9, 9, 5, 6]
+    assert flat.read()["ours"]["float32"].tolist() == [9, 9, 9, 9, 5, 6]
+    assert flat.read()["theirs"]["float32"].tolist() == [1, 2, 3, 4, 5, 6]
     assert before["float32"].tolist() == [1, 2, 3, 4, 5, 6]
-    flat.write(before)
+    flat.write("ours", before)
     assert ours[0].numpy().tolist() == [[1, 2], [3, 4]]
     assert [int(ours[1]), ours[2].numpy().tolist(), float(ours[3])] == [7, [5], 6]
+
+
+def test_arrays_are_split_into_the_shapes_and_the_order_of_the_variables() -> None:
+    flat = FlatVariables(some=variables())
+    parts = flat.split("some", flat.read()["some"])
+    assert [part.tolist() for part in parts] == [[[1, 2], [3, 4]], 7, [5], 6]
 
 
 @pytest.mark.parametrize(
@@ -50,7 +56,7 @@ def test_what_was_read_is_a_copy_and_can_be_written_back() -> None:
     ],
 )
 def test_what_does_not_fit_changes_nothing(arrays: dict[str, np.ndarray]) -> None:
-    flat = FlatVariables(variables())
+    flat = FlatVariables(some=variables())
     with pytest.raises(ValueError, match="for variables"):
-        flat.write(arrays)
-    assert flat.read()["float32"].tolist() == [1, 2, 3, 4, 5, 6]
+        flat.write("some", arrays)
+    assert flat.read()["some"]["float32"].tolist() == [1, 2, 3, 4, 5, 6]

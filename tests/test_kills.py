@@ -63,14 +63,12 @@ def test_it_ends_bit_for_bit_like_a_run_never_stopped(name: str, ends: dict[str,
     np.testing.assert_array_equal(
         [record[:-1] for record in ours.history], [record[:-1] for record in theirs.history]
     )
+    (our_weights, our_state), (their_weights, their_state) = (
+        run.agent.get_state() for run in (ours, theirs)
+    )
     for mine, yours in (
-        (ours.agent.online.get_weights(), theirs.agent.online.get_weights()),
-        *(
-            (mine.values(), yours.values())
-            for mine, yours in zip(
-                ours.agent.get_state().values(), theirs.agent.get_state().values(), strict=True
-            )
-        ),
+        (our_weights, their_weights),
+        *((our_state[name].values(), their_state[name].values()) for name in our_state),
         (ours.replay.get_state().values(), theirs.replay.get_state().values()),
     ):
         for array, other in zip(mine, yours, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,13 @@ def test_a_saved_network_comes_back_bit_for_bit_with_its_origin(tmp_path: Path) 
     assert loaded.origin == saved.origin
     assert (loaded.hidden_units, loaded.action_count) == ((16, 8), 5)
     assert loaded.built
+
+
+def test_the_same_network_makes_the_same_file_at_any_time(tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5", evaluated_return=-1.5)
+    time.sleep(1.1)  # HDF5 can keep a time in whole seconds
+    kp.save_weights(network(), tmp_path / "b.h5", evaluated_return=-1.5)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
 @pytest.mark.parametrize("make", [subclassed, sequential])
