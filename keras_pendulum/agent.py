@@ -10,6 +10,7 @@ import numpy as np
 import tensorflow as tf
 from numpy.typing import NDArray
 
+from keras_pendulum.backend import give_back_freed_memory
 from keras_pendulum.flat_variables import Arrays, FlatVariables
 from keras_pendulum.network import DQN
 from keras_pendulum.policy import GreedyPolicy
@@ -91,13 +92,16 @@ class Agent:
         rows = _packed(batches)
         valued = _NOTHING if observation is None else observation
         shapes = (*rows.shape, *valued.shape)
-        if shapes not in self._compiled:
+        first = shapes not in self._compiled
+        if first:
             # Concrete, because a plain tf.function looks through its arguments at each call.
             function = tf.function(self._updates, jit_compile=True, autograph=False)
             self._compiled[shapes] = function.get_concrete_function(
                 tf.TensorSpec(rows.shape), tf.TensorSpec(valued.shape)
             )
         losses, found = self._compiled[shapes](tf.constant(rows), tf.constant(valued))
+        if first:
+            give_back_freed_memory()
         self._greedy = self._valued = None
         if observation is None:
             self._greedy = GreedyPolicy(self.online, [each.numpy() for each in found])

@@ -42,3 +42,13 @@ def test_after_an_update_it_acts_on_the_new_weights_and_keeps_them_until_the_nex
     run.agent.update(batches)
     np.testing.assert_array_equal(acting.q_values(observation), values)
     assert (run.agent.policy().q_values(observation) != values).any()
+
+
+def test_freed_memory_is_given_back_after_compiling_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[None] = []
+    monkeypatch.setattr("keras_pendulum.agent.give_back_freed_memory", lambda: given.append(None))
+    run = Run(kp.preset("reference", hidden_units=(8,)))
+    run.replay.add([1, 0, 0], 1, -1.0, [1, 0, 0], False)
+    for positions in ([[0]], [[0]], [[0], [0]]):  # two shapes
+        run.agent.update(run.replay.at(positions))
+    assert len(given) == 2

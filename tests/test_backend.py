@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 import subprocess
 import sys
 
-from keras_pendulum.backend import quick_import
+import pytest
+
+from keras_pendulum.backend import give_back_freed_memory, quick_import
 
 CODE = "import os, keras_pendulum; print(os.environ['TF_NUM_INTRAOP_THREADS'])"
 
@@ -26,3 +29,9 @@ def test_a_quick_import_leaves_the_garbage_collector_on() -> None:
     with quick_import():
         assert not gc.isenabled()
     assert gc.isenabled()
+
+
+def test_a_c_library_that_keeps_freed_memory_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    give_back_freed_memory()
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
+    give_back_freed_memory()
