@@ -96,7 +96,7 @@ def _grid(figure: Figure, rows: int, columns: int) -> GridSpec:
     return figure.add_gridspec(
         rows,
         columns,
-        left=0.75 / width,
+        left=0.9 / width,
         right=1 - 0.2 / width,
         bottom=0.55 / height,
         top=1 - 0.4 / height,
