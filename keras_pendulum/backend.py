@@ -72,7 +72,7 @@ def quick_import() -> Iterator[None]:
 def give_back_freed_memory() -> None:
     """Returns to the system what was freed, where its C library can (the GNU one does).
 
-    Compiling takes some 150 MB and frees most of it, of which this process would keep 100.
+    Most of what compiling takes is freed, and would stay with this process.
     """
     with contextlib.suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)

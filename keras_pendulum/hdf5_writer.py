@@ -1,7 +1,7 @@
 """HDF5 files made in memory, by h5py's low-level calls.
 
-A checkpoint is made in the middle of a run, and there the calls that a reader of h5py's
-documentation meets first take twice as long (benchmarks/saving.py).
+A checkpoint is made in the middle of a run, which waits for it (benchmarks/saving.py), and h5py's
+usual calls would take longer.
 """
 
 from __future__ import annotations

@@ -59,6 +59,12 @@ def weights_file(
 ) -> bytes:
     """The network's `.h5`, without its digest, with further groups of arrays beside the layers.
 
+    Args:
+        network: tells what it is and where it comes from.
+        weights: its weights, as `get_weights` gives them.
+        evaluated_return: see `save_weights`.
+        groups: arrays by name, by the name of their group.
+
     Raises UserError when a weight is not finite: such a network is no policy.
     """
     require_finite(weights)
