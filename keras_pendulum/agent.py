@@ -11,7 +11,7 @@ import tensorflow as tf
 from numpy.typing import NDArray
 
 from keras_pendulum.backend import give_back_freed_memory
-from keras_pendulum.flat_variables import Arrays, FlatVariables
+from keras_pendulum.flat_variables import Arrays, FlatVariables, numbers
 from keras_pendulum.network import DQN
 from keras_pendulum.policy import GreedyPolicy
 from keras_pendulum.q_learning import double_td_target, td_target
@@ -19,7 +19,8 @@ from keras_pendulum.randomness import RandomSource
 from keras_pendulum.replay import Transitions
 from keras_pendulum.target_network import TargetUpdate
 
-_NOTHING = np.empty(0, np.float32)  # in place of an observation
+# In place of the action taken after an update, see Agent.update_between.
+ANY_ACTION, NO_ACTION = -1, -2
 
 
 class Agent:
@@ -59,20 +60,26 @@ class Agent:
         self._variables = FlatVariables(
             online=online.weights, target=target.weights, optimizer=optimizer.variables
         )
-        # By the shapes of what goes in, which stay the same during a run.
-        self._compiled: dict[tuple[int, ...], Callable[..., tuple[tf.Tensor, Any]]] = {}
-        # What there is to act on since the last update: copies of the weights, or one observation
-        # with its Q-values [A].
+        # By what they compute and the shapes of what goes in, which stay the same during a run.
+        self._compiled: dict[tuple[Any, ...], Callable[..., Any]] = {}
         self._greedy: GreedyPolicy | None = None
-        self._valued: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
 
-    def select_action(self, observation: NDArray[np.float32], epsilon: float) -> int:
-        """A random action index with probability ε, else the greedy one of observation [D]."""
+    def select_action(
+        self, observation: NDArray[np.float32], epsilon: float, known: int | None = None
+    ) -> tuple[int, bool]:
+        """A random action index with probability ε, else the greedy one of observation [D].
+
+        Args:
+            observation: [D].
+            epsilon: ε.
+            known: the greedy action, where it need not be computed.
+
+        Returns:
+            The action, and whether it is a random one.
+        """
         if self.random.uniform() <= epsilon:
-            return self.random.action(self.online.action_count)
-        if self._valued is not None and self._valued[0] is observation:
-            return int(self._valued[1].argmax())
-        return self.policy().action(observation)
+            return self.random.action(self.online.action_count), True
+        return self.policy().action(observation) if known is None else known, False
 
     def policy(self) -> GreedyPolicy:
         """The greedy policy of the weights since the last update."""
@@ -80,42 +87,78 @@ class Agent:
             self._greedy = GreedyPolicy(self.online)
         return self._greedy
 
-    def update(
-        self, batches: Transitions, observation: NDArray[np.float32] | None = None
-    ) -> NDArray[np.float32]:
+    def update(self, batches: Transitions) -> NDArray[np.float32]:
         """Learns from batches [K, B, ...], one after the other; returns the losses [K].
 
-        One compiled call makes all K updates, because a call each costs more than its update. It
-        also gives what to act on next: the weights, or the values of `observation` [D], where an
-        update comes after each step and a copy of the weights would be for a single use.
+        One compiled call makes all K updates, because a call each costs more than its update.
         """
-        rows = _packed(batches)
-        valued = _NOTHING if observation is None else observation
-        shapes = (*rows.shape, *valued.shape)
-        first = shapes not in self._compiled
+        (losses,) = self._call(self._updates, _packed(batches))
+        return losses
+
+    def update_between(
+        self, batches: Transitions, observations: NDArray[np.float32], actions: list[int]
+    ) -> NDArray[np.float32]:
+        """As `update`, until an update would have changed the action that came after it.
+
+        Args:
+            batches: [K, B, ...].
+            observations: [K, D], what was observed when update k was due.
+            actions: [K], what was done then without that update; ANY_ACTION where it was drawn at
+                random; NO_ACTION where nothing was done yet, which makes it the last update.
+
+        Returns:
+            The losses of the updates made, at least one. After the last one, and after no other,
+            the greedy action of its observation is not the one in `actions`.
+        """
+        rows = _packed(batches)  # [K, B, W]
+        acted = np.zeros_like(rows[:, :1])
+        acted[:, 0, : observations.shape[-1]] = observations
+        acted[:, 0, -1] = actions
+        losses, made = self._call(self._updates_between, np.concatenate([rows, acted], axis=1))
+        return losses[:made]
+
+    def _call(self, compute: Callable[..., Any], rows: NDArray[np.float32]) -> list[Any]:
+        """What `compute` makes of rows, compiled; the weights after it are those to act on."""
+        key = (compute, rows.shape)
+        first = key not in self._compiled
         if first:
             # Concrete, because a plain tf.function looks through its arguments at each call.
-            function = tf.function(self._updates, jit_compile=True, autograph=False)
-            self._compiled[shapes] = function.get_concrete_function(
-                tf.TensorSpec(rows.shape), tf.TensorSpec(valued.shape)
-            )
-        losses, found = self._compiled[shapes](tf.constant(rows), tf.constant(valued))
+            self._compiled[key] = tf.function(
+                lambda rows: (compute(rows), self._variables.joined("online")),
+                jit_compile=True,
+                autograph=False,
+            ).get_concrete_function(tf.TensorSpec(rows.shape))
+        found, online = self._compiled[key](tf.constant(rows))
         if first:
             give_back_freed_memory()
-        self._greedy = self._valued = None
-        if observation is None:
-            self._greedy = GreedyPolicy(self.online, [each.numpy() for each in found])
-        else:
-            self._valued = (observation, found.numpy())
-        return losses.numpy()
+        weights = self._variables.split("online", numbers(online))
+        self._greedy = GreedyPolicy(self.online, weights)
+        return [each.numpy() for each in found]
 
-    def _updates(self, rows: tf.Tensor, observation: tf.Tensor) -> tuple[tf.Tensor, Any]:
-        batches = _unpacked(rows)
-        losses = tf.scan(lambda _, batch: self.learn(batch), batches, initializer=0.0)  # [K]
-        if observation.shape == _NOTHING.shape:
-            # Reading them in calls of their own takes as long as an update.
-            return losses, [each.value.read_value() for each in self.online.weights]
-        return losses, self.online(observation[tf.newaxis])[0]  # [K], [A]
+    def _updates(self, rows: tf.Tensor) -> tuple[tf.Tensor]:
+        losses = tf.scan(
+            lambda _, batch: self.learn(batch), _unpacked(rows), initializer=0.0
+        )  # [K]
+        return (losses,)
+
+    def _updates_between(self, rows: tf.Tensor) -> tuple[tf.Tensor, tf.Tensor]:
+        size = self.online.observation_size
+
+        def update(made: tf.Tensor, losses: tf.Tensor, _: tf.Tensor) -> tuple[tf.Tensor, ...]:
+            row = rows[made]
+            batch, acted = row[:-1], row[-1:]  # [B, W], [1, W]
+            loss = self.learn(_unpacked(batch))
+            losses = tf.tensor_scatter_nd_update(losses, [[made]], [loss])
+            action = tf.cast(acted[0, -1], tf.int64)
+            greedy = tf.argmax(self.online(acted[:, :size])[0])
+            return made + 1, losses, (action == greedy) | (action == ANY_ACTION)
+
+        made, losses, _ = tf.while_loop(
+            lambda made, losses, unchanged: unchanged,
+            update,
+            (0, tf.zeros(rows.shape[0]), True),
+        )
+        return losses, made
 
     def learn(self, batch: Transitions) -> tf.Tensor:
         """One update from a batch [B, ...]; returns its loss, a scalar."""
@@ -145,7 +188,7 @@ class Agent:
         for name in ("target", "optimizer"):
             self._variables.write(name, state[name])
         self.online.set_weights(online)
-        self._greedy = self._valued = None
+        self._greedy = None
 
 
 def _packed(batches: Transitions) -> NDArray[np.float32]:
@@ -158,7 +201,7 @@ def _packed(batches: Transitions) -> NDArray[np.float32]:
 
 
 def _unpacked(rows: tf.Tensor) -> Transitions:
-    """The batches [K, B, ...] of `_packed`; float32 holds every index up to 2²⁴ exactly."""
+    """The batches [..., B] of `_packed`; float32 holds every index up to 2²⁴ exactly."""
     size = (rows.shape[-1] - 3) // 2
     observation, action, reward, following, terminated = tf.split(rows, [size, 1, 1, size, 1], -1)
     return Transitions(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -60,3 +61,21 @@ def make_environment(
         disable_env_checker=True,
         **physics,
     )
+
+
+def snapshot(env: gymnasium.Env[Any, Any]) -> Callable[[], None]:
+    """What, called later, brings an environment of TASKS back to where it stands now.
+
+    Good for steps, not for resets: steps of these environments draw nothing and replace what they
+    change, so that the values of the attributes suffice.
+    """
+    layers = [env]
+    while layers[-1] is not env.unwrapped:
+        layers.append(layers[-1].env)  # type: ignore[attr-defined]
+    states = [(layer, dict(vars(layer))) for layer in layers]
+
+    def go_back() -> None:
+        for layer, state in states:
+            vars(layer).update(state)
+
+    return go_back

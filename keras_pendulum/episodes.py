@@ -5,19 +5,15 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
-from keras_pendulum.actions import Actions
-from keras_pendulum.agent import Agent
 from keras_pendulum.config import Config
 from keras_pendulum.errors import UserError
 from keras_pendulum.exploration import make_schedule
-from keras_pendulum.randomness import RandomSource
-from keras_pendulum.replay import ReplayBuffer
+from keras_pendulum.rehearsal import AHEAD, learn_each_step
+from keras_pendulum.rollout import Parts, Rollout
 
 
 class EpisodeRecord(NamedTuple):
@@ -40,80 +36,60 @@ class EpisodeRecord(NamedTuple):
         )
 
 
-def learn_episodes(
-    env: gymnasium.Env[Any, Any],
-    actions: Actions,
-    agent: Agent,
-    replay: ReplayBuffer,
-    random: RandomSource,
-    config: Config,
-    last: EpisodeRecord | None = None,
-) -> Iterator[EpisodeRecord]:
+def learn_episodes(parts: Parts, last: EpisodeRecord | None = None) -> Iterator[EpisodeRecord]:
     """Yields the record of each episode, from the one after `last` to the last of the run.
-
-    The environment is seeded before episode 0 only, as in the recorded run; afterwards its own
-    generator goes on.
 
     Raises UserError, with episode and step, when a reward, an observation or a loss is not finite:
     nothing that follows could be trusted.
     """
+    config, replay = parts.config, parts.replay
     schedule = make_schedule(config)
     first = 0 if last is None else last.episode + 1
     updates = 0 if last is None else last.updates
-
-    def learn(count: int, following: NDArray[np.float32] | None = None) -> list[float]:
-        positions = [
-            random.batch_positions(len(replay), config.batch_size) for _ in range(count)
-        ]  # [K, B]
-        losses: list[float] = agent.update(replay.at(positions), following).tolist()
-        wrong = [loss for loss in losses if not math.isfinite(loss)]
-        if wrong:
-            raise UserError(
-                f"episode {episode}, step {replay.added - before}: the loss is {wrong[0]}, "
-                "learning has diverged; try a smaller learning_rate"
-            )
-        return losses
+    # What is shown cannot be taken back.
+    ahead = AHEAD if parts.env.render_mode is None else 1
 
     for episode in range(first, config.episodes):
         started = time.perf_counter()
-        before = replay.added
-        total = 0.0
-        losses: list[float] = []
-        observation, _ = env.reset(seed=random.seed if episode == 0 else None)
-        over = False
-        while not over:
-            epsilon = schedule(episode, replay.added)
-            action = agent.select_action(observation, epsilon)
-            following, reward, terminated, truncated, _ = env.step(actions.control(action))
-            reward = float(reward)
-            if not math.isfinite(reward + following.dot(following)):
-                raise UserError(
-                    f"episode {episode}, step {replay.added - before + 1}: the environment gave "
-                    f"the reward {reward} and the observation {following}"
-                )
-            replay.add(
-                observation,
-                actions.remembered_index(action),
-                config.reward_scale * reward,
-                following,
-                terminated,
-            )
-            if config.update_after == "step" and len(replay) >= config.batch_size:
-                losses += learn(1, following)
-            total += reward
-            observation = following
-            over = terminated or truncated
-        due = config.update_after == "episode" and episode > config.learning_starts
-        if due and len(replay) >= config.batch_size:
-            losses += learn(config.updates_per_episode)
+        rollout = Rollout(parts, schedule, episode)
+        if config.update_after == "step":
+            losses = learn_each_step(rollout, parts, ahead)
+        else:
+            while not rollout.over:
+                rollout.step()
+            losses = _learn(parts) if episode > config.learning_starts else []
+        _require_finite(losses, rollout, config)
         updates += len(losses)
         yield EpisodeRecord(
             episode=episode,
-            average_reward=total / (replay.added - before),
-            episode_return=total,
-            epsilon=epsilon,
+            average_reward=rollout.total / rollout.steps,
+            episode_return=rollout.total,
+            epsilon=rollout.epsilon,
             loss=float(np.mean(losses)) if losses else float("nan"),
             environment_steps=replay.added,
             updates=updates,
             seconds=time.perf_counter() - started,
         )
+
+
+def _learn(parts: Parts) -> list[float]:
+    """The updates after an episode; returns their losses."""
+    _, _, agent, replay, random, config = parts
+    if len(replay) < config.batch_size:
+        return []
+    positions = [
+        random.batch_positions(len(replay), config.batch_size)
+        for _ in range(config.updates_per_episode)
+    ]  # [K, B]
+    losses: list[float] = agent.update(replay.at(positions)).tolist()
+    return losses
+
+
+def _require_finite(losses: list[float], rollout: Rollout, config: Config) -> None:
+    for i, loss in enumerate(losses):
+        if not math.isfinite(loss):
+            later = len(losses) - 1 - i if config.update_after == "step" else 0
+            raise UserError(
+                f"episode {rollout.episode}, step {rollout.steps - later}: the loss is {loss}, "
+                "learning has diverged; try a smaller learning_rate"
+            )

@@ -88,6 +88,8 @@ def huber(q: tf.Tensor, action: tf.Tensor, target: tf.Tensor) -> tf.Tensor:
     Returns:
         scalar float32.
     """
-    error = tf.gather(q, action, batch_dims=1) - target  # [B]
+    # A sum with one term each, because the gradient of a gather is a loop over the batch.
+    taken = tf.one_hot(action, q.shape[1])  # [B, A]
+    error = tf.reduce_sum(taken * q, axis=1) - target  # [B]
     size = tf.abs(error)
     return tf.reduce_mean(tf.where(size < 1.0, 0.5 * tf.square(error), size - 0.5))

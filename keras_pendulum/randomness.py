@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ class RandomSource:
         self.seed = seed
         self._exploration = np.random.RandomState(seed)
         self._replay = random.Random(seed)
+        self._put_back: list[list[int]] = []  # batches, the next one last
         self.uniform = self._exploration.random_sample  # [0, 1), the draw compared with ε
 
     def action(self, count: int) -> int:
@@ -28,14 +30,26 @@ class RandomSource:
 
     def batch_positions(self, stored: int, batch_size: int) -> list[int]:
         """Positions of one batch among `stored` transitions, without replacement: [B]."""
+        if self._put_back:
+            return self._put_back.pop()
         return self._replay.sample(range(stored), batch_size)
 
+    def put_back(self, batches: Sequence[list[int]]) -> None:
+        """Takes the last batches handed out, in their order, for when they are asked for again."""
+        self._put_back.extend(reversed(batches))
+
+    def exploration_snapshot(self) -> Callable[[], None]:
+        """What, called later, has the draws for exploration go on from here once more."""
+        state = self._exploration.get_state(legacy=True)
+        return lambda: self._exploration.set_state(state)
+
     def get_state(self) -> dict[str, Any]:
-        """The state of both streams, in JSON's types."""
+        """The state of both streams and the batches put back, in JSON's types."""
         name, keys, position, has_gauss, gauss = self._exploration.get_state(legacy=True)
         return {
             "exploration": [name, np.asarray(keys).tolist(), position, has_gauss, gauss],
             "replay": self._replay.getstate(),
+            "put_back": list(self._put_back),
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -45,3 +59,5 @@ class RandomSource:
         self._exploration.set_state((name, words, position, has_gauss, gauss))
         version, internal, gauss_next = state["replay"]
         self._replay.setstate((version, tuple(internal), gauss_next))
+        # Runs of earlier versions never had any.
+        self._put_back = list(state.get("put_back", []))

@@ -22,17 +22,24 @@ class Transitions(NamedTuple):
 
 
 class ReplayBuffer:
-    """Holds the last `capacity` transitions (Mnih et al. 2015, Methods)."""
+    """Holds the last `capacity` transitions (Mnih et al. 2015, Methods).
 
-    def __init__(self, capacity: int, observation_size: int = 3) -> None:
+    Args:
+        capacity: how many.
+        observation_size: D.
+        spare: how many of the last ones can be taken back: as many more are kept.
+    """
+
+    def __init__(self, capacity: int, observation_size: int = 3, spare: int = 0) -> None:
         self.capacity = capacity
+        self._slots = capacity + spare
         self._added = 0
         self._arrays = Transitions(
-            observation=np.zeros((capacity, observation_size), np.float32),
-            action=np.zeros(capacity, np.int32),
-            reward=np.zeros(capacity, np.float32),
-            next_observation=np.zeros((capacity, observation_size), np.float32),
-            terminated=np.zeros(capacity, bool),
+            observation=np.zeros((self._slots, observation_size), np.float32),
+            action=np.zeros(self._slots, np.int32),
+            reward=np.zeros(self._slots, np.float32),
+            next_observation=np.zeros((self._slots, observation_size), np.float32),
+            terminated=np.zeros(self._slots, bool),
         )
 
     def __len__(self) -> int:
@@ -47,7 +54,7 @@ class ReplayBuffer:
         terminated: bool,
     ) -> None:
         """Stores one transition, in the place of the oldest when the buffer is full."""
-        slot = self._added % self.capacity
+        slot = self._added % self._slots
         arrays = self._arrays
         arrays.observation[slot] = observation
         arrays.action[slot] = action
@@ -55,6 +62,10 @@ class ReplayBuffer:
         arrays.next_observation[slot] = next_observation
         arrays.terminated[slot] = terminated
         self._added += 1
+
+    def take_back(self, count: int) -> None:
+        """Forgets the last `count` ≤ `spare` transitions; what they had pushed out is back."""
+        self._added -= count
 
     def at(self, positions: ArrayLike) -> Transitions:
         """The transitions at `positions` [...], counted from the oldest (0) on.
@@ -64,14 +75,19 @@ class ReplayBuffer:
         wanted: NDArray[np.int64] = np.asarray(positions, np.int64)
         if wanted.size and not 0 <= wanted.min() <= wanted.max() < len(self):
             raise IndexError(f"position outside the {len(self)} stored transitions")
-        slots = (self._added - len(self) + wanted) % self.capacity
-        return Transitions(*(array[slots] for array in self._arrays))
+        return self.numbered(self.oldest + wanted)
+
+    def numbered(self, numbers: NDArray[np.int64]) -> Transitions:
+        """Transitions by their numbers [...] since the start of the run, `spare` past ones too."""
+        slots = numbers % self._slots
+        return Transitions(*(array.take(slots, axis=0) for array in self._arrays))
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """All stored transitions, oldest first, one array a field."""
-        start = self._added % self.capacity if self._added > self.capacity else 0
+        start = self.oldest % self._slots
+        end = start + len(self)
         return {
-            name: np.concatenate([array[start : len(self)], array[:start]])
+            name: np.concatenate([array[start:end], array[: max(0, end - self._slots)]])
             for name, array in self._arrays._asdict().items()
         }
 
@@ -85,9 +101,14 @@ class ReplayBuffer:
             if state[name].shape != (stored, *array.shape[1:]) or added < 0:
                 raise ValueError(f"{name} of {added} transitions has shape {state[name].shape}")
         self._added = added
-        slots = (added - stored + np.arange(stored)) % self.capacity
+        slots = (added - stored + np.arange(stored)) % self._slots
         for name, array in self._arrays._asdict().items():
             array[slots] = state[name]
+
+    @property
+    def oldest(self) -> int:
+        """The number of the oldest stored transition, 0 being the first of the run."""
+        return self._added - len(self)
 
     @property
     def added(self) -> int:

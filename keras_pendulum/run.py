@@ -18,7 +18,9 @@ from keras_pendulum.errors import ConfigError
 from keras_pendulum.network import DQN, Origin
 from keras_pendulum.q_learning import huber, mean_squared_error
 from keras_pendulum.randomness import RandomSource
+from keras_pendulum.rehearsal import AHEAD
 from keras_pendulum.replay import ReplayBuffer
+from keras_pendulum.rollout import Parts
 from keras_pendulum.target_network import make_target
 
 
@@ -44,7 +46,9 @@ class Run:
         )
         self.actions = actions_of(config)
         self.replay = ReplayBuffer(
-            config.replay_capacity, TASKS[config.environment].observation_size
+            config.replay_capacity,
+            TASKS[config.environment].observation_size,
+            spare=AHEAD if config.update_after == "step" else 0,
         )
         self.agent = make_agent(config, self.random, initial)
         self.history: list[EpisodeRecord] = []
@@ -52,9 +56,8 @@ class Run:
     def episodes(self) -> Iterator[EpisodeRecord]:
         """Goes on to the end of the run, yielding each episode's record."""
         last = self.history[-1] if self.history else None
-        for record in learn_episodes(
-            self.env, self.actions, self.agent, self.replay, self.random, self.config, last
-        ):
+        parts = Parts(self.env, self.actions, self.agent, self.replay, self.random, self.config)
+        for record in learn_episodes(parts, last):
             self.history.append(record)
             yield record
 

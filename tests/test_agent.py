@@ -22,10 +22,11 @@ def test_it_explores_when_the_draw_is_at_most_epsilon(
     monkeypatch.setattr(agent.random, "uniform", lambda: draw)
     monkeypatch.setattr(agent.random, "action", draw_action)
     observation = np.array([1, 0, 0], np.float32)
-    action = agent.select_action(observation, epsilon=0.3)
+    action, explored = agent.select_action(observation, epsilon=0.3)
     assert asked == ([41] if explores else [])
     greedy = int(agent.online(observation[np.newaxis]).numpy().argmax())
-    assert action == (7 if explores else greedy)
+    assert (action, explored) == (7 if explores else greedy, explores)
+    assert agent.select_action(observation, 0.3, known=3) == (7 if explores else 3, explores)
 
 
 def test_after_an_update_it_acts_on_the_new_weights_and_keeps_them_until_the_next() -> None:

@@ -64,3 +64,36 @@ def test_exploration_is_uniform_over_the_torques() -> None:
 def test_every_action_can_be_drawn(count: int) -> None:
     source = RandomSource(0)
     assert {source.action(count) for _ in range(2000)} == set(range(count))
+
+
+def test_batches_put_back_come_again_first_also_from_a_saved_state() -> None:
+    source, plain = RandomSource(0), RandomSource(0)
+    drawn = [source.batch_positions(1000, 8) for _ in range(4)]
+    source.put_back(drawn[2:])
+    assert source.batch_positions(1000, 8) == drawn[2]
+    source.put_back(drawn[2:3])
+    other = RandomSource(99)
+    other.set_state(json.loads(json.dumps(source.get_state())))
+    for goes_on in (source, other):
+        assert [goes_on.batch_positions(1000, 8) for _ in range(2)] == drawn[2:]
+    for _ in range(4):
+        plain.batch_positions(1000, 8)
+    assert source.batch_positions(1000, 8) == plain.batch_positions(1000, 8)
+
+
+def test_a_state_of_a_version_that_put_nothing_back_is_taken() -> None:
+    state = RandomSource(0).get_state()
+    del state["put_back"]
+    source = RandomSource(5)
+    source.put_back([[1, 2]])
+    source.set_state(state)
+    assert draws(source) == draws(RandomSource(0))
+
+
+def test_exploration_goes_on_from_a_snapshot_once_more() -> None:
+    source = RandomSource(0)
+    source.uniform()
+    go_back = source.exploration_snapshot()
+    first = [source.uniform(), source.action(41), source.uniform()]
+    go_back()
+    assert [source.uniform(), source.action(41), source.uniform()] == first

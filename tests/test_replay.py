@@ -57,3 +57,22 @@ def test_a_restored_buffer_goes_on_like_the_saved_one(count: int) -> None:
         restored.at(range(len(restored))), saved.at(range(len(saved))), strict=True
     ):
         np.testing.assert_array_equal(ours, theirs)
+
+
+def test_what_was_taken_back_is_as_if_it_never_came() -> None:
+    replay, plain = ReplayBuffer(4, spare=3), filled(4, 9)
+    for count in (9, 12):  # 9, 10 and 11 come, and go
+        while replay.added < count:
+            replay.add(
+                [replay.added] * 3, replay.added, -replay.added, [replay.added + 1] * 3, False
+            )
+    numbers = np.array([[5, 8], [8, 11]])
+    np.testing.assert_array_equal(replay.numbered(numbers).action, numbers)
+    replay.take_back(3)
+    assert (replay.added, replay.oldest, len(replay)) == (9, 5, 4)
+    for ours, theirs in zip(replay.at(range(4))[:4], plain.at(range(4))[:4], strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_array_equal(replay.get_state()["action"], [5, 6, 7, 8])
+    restored = ReplayBuffer(4, spare=3)
+    restored.set_state(replay.get_state(), 9)
+    np.testing.assert_array_equal(restored.at(range(4)).action, [5, 6, 7, 8])

@@ -2,8 +2,8 @@
 
     python tests/torch_cartpole.py OUT.npz [SEED [EPISODES]]
 
-records a run. It reads on its own; only the random draws come from the package, so that both can
-make the same ones. tests/test_torch_cartpole.py holds the two against each other, and
+records a run. It reads on its own; only the draws for exploration come from the package, so that
+both can make the same ones. tests/test_torch_cartpole.py holds the two against each other, and
 benchmarks/cartpole.py races them.
 """
 
@@ -13,6 +13,7 @@ import math
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from random import Random
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -112,7 +113,7 @@ class Learner:
 def episodes(learner: Learner, seed: int, count: int) -> Iterator[list[int]]:
     """Trains; yields the actions of each episode, one a step."""
     env = gymnasium.make("CartPole-v1")
-    random = RandomSource(seed)
+    random, batches = RandomSource(seed), Random(seed)
     memory: deque[Batch] = deque(maxlen=MEMORY)
     steps = 0
     for episode in range(count):
@@ -135,14 +136,14 @@ def episodes(learner: Learner, seed: int, count: int) -> Iterator[list[int]]:
             state = following
             actions.append(int(action))
             if len(memory) >= BATCH_SIZE:
-                learner.update(drawn(memory, random))
+                learner.update(drawn(memory, batches))
             over = terminated or truncated
         yield actions
 
 
-def drawn(memory: deque[Batch], random: RandomSource) -> Batch:
+def drawn(memory: deque[Batch], random: Random) -> Batch:
     """A batch of what the memory holds, without replacement."""
-    rows = [memory[i] for i in random.batch_positions(len(memory), BATCH_SIZE)]
+    rows = random.sample(memory, BATCH_SIZE)
     return Batch(*map(torch.cat, zip(*rows, strict=True)))
 
 
