@@ -45,7 +45,7 @@ def _rehearse(rollout: Rollout, parts: Parts, ahead: int) -> list[float]:
     while len(steps) < ahead and not rollout.over:
         steps.append(rollout.step())
         batches.append(random.batch_positions(len(replay), config.batch_size))
-        numbers.append(replay.oldest + np.array(batches[-1]))
+        numbers.append(replay.oldest + np.array(batches[-1], np.int64))
     # The compiled call has a fixed size: what is beyond the end comes after NO_ACTION.
     rest = ahead - len(steps)
     actions = [ANY_ACTION if step.explored else step.action for step in steps[1:]]

@@ -78,7 +78,10 @@ class ReplayBuffer:
         return self.numbered(self.oldest + wanted)
 
     def numbered(self, numbers: NDArray[np.int64]) -> Transitions:
-        """Transitions by their numbers [...] since the start of the run, `spare` past ones too."""
+        """Transitions by their numbers [...] since the start of the run.
+
+        Besides those stored, the last `spare` that were pushed out are still there.
+        """
         slots = numbers % self._slots
         return Transitions(*(array.take(slots, axis=0) for array in self._arrays))
 
