@@ -60,4 +60,4 @@ class RandomSource:
         version, internal, gauss_next = state["replay"]
         self._replay.setstate((version, tuple(internal), gauss_next))
         # Runs of earlier versions never had any.
-        self._put_back = list(state.get("put_back", []))
+        self._put_back = [list(map(int, batch)) for batch in state.get("put_back", [])]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum import episodes
 from keras_pendulum.agent import ANY_ACTION, NO_ACTION, Agent
+from keras_pendulum.checkpoint import load_checkpoint, save_checkpoint
 from keras_pendulum.policy import GreedyPolicy
 from keras_pendulum.rehearsal import AHEAD
 from keras_pendulum.rollout import Rollout
@@ -169,3 +171,19 @@ def test_a_loss_that_is_not_finite_is_told_with_its_step(monkeypatch: pytest.Mon
     episode, step = (int(word.rstrip(",:")) for word in str(caught.value).split()[1:4:2])
     before = run.history[episode - 1].environment_steps
     assert before + step == CONFIG.batch_size + 40
+
+
+def test_a_run_saved_with_batches_put_back_goes_on_like_the_unsaved_one(tmp_path: Path) -> None:
+    run = Run(CONFIG)
+    left = run.episodes()
+    while not run.random.get_state()["put_back"]:
+        next(left)  # ends with StopIteration if no rehearsal ever went beyond the episode's end
+    save_checkpoint(run, tmp_path / "cartpole_weight.h5")
+    resumed = load_checkpoint(tmp_path / "cartpole_weight.h5", CONFIG)
+    rest = len(list(left))
+    assert len(list(resumed.episodes())) == rest > 0
+    assert [record[:4] for record in resumed.history] == [record[:4] for record in run.history]
+    for ours, theirs in zip(
+        resumed.agent.online.get_weights(), run.agent.online.get_weights(), strict=True
+    ):
+        np.testing.assert_array_equal(ours, theirs)
