@@ -107,8 +107,8 @@ class Agent:
                 random; NO_ACTION where nothing was done yet, which makes it the last update.
 
         Returns:
-            The losses of the updates made, at least one. After the last one, and after no other,
-            the greedy action of its observation is not the one in `actions`.
+            The losses of the updates made: up to the first after which the greedy action of its
+            observation is not the one in `actions`; all K when there is none.
         """
         rows = _packed(batches)  # [K, B, W]
         acted = np.zeros_like(rows[:, :1])
@@ -154,7 +154,7 @@ class Agent:
             return made + 1, losses, (action == greedy) | (action == ANY_ACTION)
 
         made, losses, _ = tf.while_loop(
-            lambda made, losses, unchanged: unchanged,
+            lambda made, losses, unchanged: unchanged & (made < rows.shape[0]),
             update,
             (0, tf.zeros(rows.shape[0]), True),
         )

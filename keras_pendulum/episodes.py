@@ -58,7 +58,7 @@ def learn_episodes(parts: Parts, last: EpisodeRecord | None = None) -> Iterator[
             while not rollout.over:
                 rollout.step()
             losses = _learn(parts) if episode > config.learning_starts else []
-        _require_finite(losses, rollout, config)
+        _check_losses(losses, rollout, config)
         updates += len(losses)
         yield EpisodeRecord(
             episode=episode,
@@ -85,7 +85,7 @@ def _learn(parts: Parts) -> list[float]:
     return losses
 
 
-def _require_finite(losses: list[float], rollout: Rollout, config: Config) -> None:
+def _check_losses(losses: list[float], rollout: Rollout, config: Config) -> None:
     for i, loss in enumerate(losses):
         if not math.isfinite(loss):
             later = len(losses) - 1 - i if config.update_after == "step" else 0

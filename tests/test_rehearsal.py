@@ -133,8 +133,6 @@ def test_updates_go_on_until_one_would_have_changed_the_action(
     actions = actions_after_each_update()
     if changed is not None:
         actions[changed] = 1 - actions[changed]
-    if made == 5:
-        actions[-1] = NO_ACTION
     agent, batches, observations = filled_agent()
     losses = agent.update_between(batches, observations, actions)
     twin, batches, _ = filled_agent()
