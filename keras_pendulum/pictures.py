@@ -100,7 +100,7 @@ def _grid(figure: Figure, rows: int, columns: int) -> GridSpec:
         right=1 - 0.2 / width,
         bottom=0.55 / height,
         top=1 - 0.4 / height,
-        wspace=0.24,
+        wspace=0.3,
         hspace=0.36,
     )
 
