@@ -35,7 +35,7 @@ from keras_pendulum.run import make_agent, make_optimizer  # noqa: E402
 from keras_pendulum.target_network import make_target  # noqa: E402
 
 SEEDS = (2, 4, 8)
-UPDATES = 22  # in one call, as after an episode
+UPDATES = 30  # in one call, as after an episode
 STEPS = 2000
 ROUNDS = 25
 

@@ -103,7 +103,7 @@ class Config:
         high=1_000_000,
     )
     updates_per_episode: int = setting(
-        22,
+        30,
         "update_after episode: gradient updates (original: 1, `update-starvation`)",
         low=1,
         high=10_000,

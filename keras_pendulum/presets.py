@@ -40,7 +40,6 @@ _SWINGUP = replace(
     discount=0.98,
     reward_scale=0.02,
     epsilon_decay=0.997,
-    updates_per_episode=30,
 )
 
 # The agent of the two PyTorch notebooks, with their numbers.

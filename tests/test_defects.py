@@ -95,7 +95,7 @@ def test_update_starvation_459_updates_are_not_enough_even_on_good_data(
     there is near -90, and 459 updates have hardly begun to carry it that far.
     """
     assert kp.preset("original").total_updates == 459
-    assert kp.preset("reference").total_updates == 22 * 459
+    assert kp.preset("reference").total_updates == 30 * 459
     hanging = np.array([[-1, 0, 0]], np.float32)
     random = np.random.RandomState(0)
     agent = Run(kp.preset("reference")).agent
