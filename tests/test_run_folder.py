@@ -43,7 +43,7 @@ def test_a_run_leaves_its_four_files(tmp_path: Path) -> None:
     assert [float(row["return"]) for row in rows] == [r.episode_return for r in result.history]
     assert rows[40]["loss"] == ""
     assert float(rows[41]["loss"]) > 0
-    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "110")
+    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "150")
 
     picture = matplotlib.image.imread(folder / "rewards.png")
     assert picture.shape[0] > 300
