@@ -15,9 +15,10 @@ import json
 import multiprocessing
 import sys
 from dataclasses import fields, replace
+from functools import partial
 
 import keras_pendulum as kp
-from benchmarks.report import RESULTS, best_mean_return, write
+from benchmarks.report import RESULTS, Row, best_mean_return, write
 
 BEFORE = {"reference": "original", "swingup": "reference", "cartpole": "cartpole-original"}
 # The task itself is no departure, and the name none either.
@@ -40,25 +41,21 @@ def measured(preset: str) -> dict[str, list[float]]:
     return {row["training"]: row["regrets"] for row in rows}
 
 
-def regret(config: kp.Config) -> float:
+def regret(config: kp.Config, starts: range) -> float:
     """Greedy regret after one training, rounded to 0.1."""
-    score = kp.evaluate_policy(kp.train_dqn(config).network)
+    network = kp.train_dqn(config).network
+    score = kp.evaluate_policy(network, episodes=len(starts), seed=starts[0])
     return round(best_mean_return(score) - score.mean_return, 1)
 
 
-def main(preset: str = "reference", seeds: str = "5") -> None:
-    """Trains every variant and writes the results."""
-    ours, theirs = kp.preset(preset), kp.preset(BEFORE[preset])
-    variants = {BEFORE[preset]: replace(theirs, gravity=ours.gravity), preset: ours}
-    for name in departures(preset):
-        back = (name, *_TAKEN_BACK_TOO.get(name, ()))
-        variants[name] = replace(ours, **{each: getattr(theirs, each) for each in back})
-    rows = []
+def trained(variants: dict[str, kp.Config], seeds: range, starts: range) -> list[Row]:
+    """A row for each variant, trained with all of `seeds`, two at a time."""
+    rows: list[Row] = []
     # Fresh processes, because TensorFlow does not survive a fork.
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         for name, config in variants.items():
-            configs = [replace(config, seed=seed) for seed in range(int(seeds))]
-            regrets = pool.map(regret, configs, 1)
+            configs = [replace(config, seed=seed) for seed in seeds]
+            regrets = pool.map(partial(regret, starts=starts), configs, 1)
             rows.append(
                 {
                     "training": name,
@@ -68,6 +65,17 @@ def main(preset: str = "reference", seeds: str = "5") -> None:
                 }
             )
             print(f"{name:25} {regrets}", flush=True)
+    return rows
+
+
+def main(preset: str = "reference", seeds: str = "5") -> None:
+    """Trains every variant and writes the results."""
+    ours, theirs = kp.preset(preset), kp.preset(BEFORE[preset])
+    variants = {BEFORE[preset]: replace(theirs, gravity=ours.gravity), preset: ours}
+    for name in departures(preset):
+        back = (name, *_TAKEN_BACK_TOO.get(name, ()))
+        variants[name] = replace(ours, **{each: getattr(theirs, each) for each in back})
+    rows = trained(variants, range(int(seeds)), range(100))
     write(f"departures_{preset}", f"python -m benchmarks.departures {preset} {seeds}", rows)
 
 

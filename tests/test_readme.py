@@ -13,7 +13,9 @@ import h5py
 import pytest
 
 import keras_pendulum as kp
+from benchmarks.choosing import ARMS
 from benchmarks.departures import BEFORE, departures, measured
+from benchmarks.report import RESULTS
 from keras_pendulum.layer_files import text
 
 ROOT = Path(__file__).parents[1]
@@ -68,6 +70,13 @@ def test_the_text_beside_a_table_has_the_measured_regrets_too(preset: str) -> No
     regrets = measured(preset)
     assert f"with all of them it is {summary(regrets[preset])};" in flowing
     assert f"of `{BEFORE[preset]}` {summary(regrets[BEFORE[preset]])}." in flowing
+
+
+def test_the_settings_not_taken_have_the_measured_regrets() -> None:
+    rows = json.loads((RESULTS / "choosing.json").read_text(encoding="utf-8"))["rows"]
+    assert [row["training"] for row in rows] == [arm.partition(":")[0] for arm in ARMS]
+    for row in rows:
+        assert f"{row['training']} {summary(row['regrets'])}" in " ".join(README.split())
 
 
 def test_the_studys_table_is_the_measured_one() -> None:
