@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import gc
+import importlib
 import os
 import sys
 from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
 
 from keras_pendulum.errors import UserError
 
@@ -53,20 +56,50 @@ def require_tensorflow() -> None:
 
 @contextlib.contextmanager
 def quick_import() -> Iterator[None]:
-    """Keeps the garbage collector away from what is imported meanwhile.
+    """Imports of TensorFlow and Keras go faster within.
 
-    TensorFlow makes so many objects that live until the end that looking through them, again and
-    again and once more at exit, takes longer than half of the import itself.
+    TensorFlow makes so many objects that live until the end that the garbage collector, looking
+    through them again and again and once more at exit, takes longer than half of the import itself.
+    And Keras imports Matplotlib for galleries of images that nobody here shows.
     """
     imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
     gc.disable()
     try:
-        yield
+        with _when_used("matplotlib.patches", "matplotlib.pyplot"):
+            yield
     finally:
         if enabled:
             gc.enable()
         if not imported and "tensorflow" in sys.modules:
             gc.freeze()
+
+
+class _WhenUsed(ModuleType):
+    """Stands for a module, which is imported once something of it is asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # the import system's questions
+            raise AttributeError(name)
+        self.remove()
+        return getattr(importlib.import_module(self.__name__), name)
+
+    def remove(self) -> None:
+        """Makes room for the module itself."""
+        if sys.modules.get(self.__name__) is self:
+            del sys.modules[self.__name__]
+
+
+@contextlib.contextmanager
+def _when_used(*names: str) -> Iterator[None]:
+    """What imports these modules within gets each when it first uses it."""
+    stand_ins = [_WhenUsed(name) for name in names]
+    for stand_in in stand_ins:
+        sys.modules.setdefault(stand_in.__name__, stand_in)
+    try:
+        yield
+    finally:
+        for stand_in in stand_ins:
+            stand_in.remove()
 
 
 def give_back_freed_memory() -> None:
