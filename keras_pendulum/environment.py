@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import gymnasium
+    import numpy as np
+    from numpy.typing import NDArray
 
 STEPS_PER_EPISODE = 200  # Pendulum-v1 truncates here and never terminates
 
@@ -61,6 +63,18 @@ def make_environment(
         disable_env_checker=True,
         **physics,
     )
+
+
+def pendulum_starts(seeds: Iterable[int]) -> NDArray[np.float64]:
+    """The states [N, 2], θ in rad and θ̇ in rad/s, that `reset(seed=…)` draws for the seeds [N]."""
+    import numpy as np
+
+    env = make_environment("Pendulum-v1", gravity=1.0).unwrapped
+    states = []
+    for seed in seeds:
+        env.reset(seed=seed)
+        states.append(env.state)  # type: ignore[attr-defined]
+    return np.array(states, np.float64).reshape(-1, 2)
 
 
 def snapshot(env: gymnasium.Env[Any, Any]) -> Callable[[], None]:

@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.command_line import OneLineParser, run_command
-from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
+from keras_pendulum.environment import STEPS_PER_EPISODE, pendulum_starts
 from keras_pendulum.errors import ConfigError, UserError
 from keras_pendulum.torque import MAX_TORQUE
 from keras_pendulum.value_tables import (
@@ -99,7 +99,7 @@ def optimal_return(
         if missing:
             missing = sorted({*missing, *USUAL_SEEDS} - known.keys())
             _log.warning("Solving for the best possible returns at g = %g, once: ~20 s", gravity)
-            found = _best_return(gravity, _starts(missing), steps)
+            found = _best_return(gravity, pendulum_starts(missing), steps)
             fresh = dict(zip(missing, found.tolist(), strict=True))
             known |= fresh
             try:
@@ -149,16 +149,6 @@ def _searched_return(
         past += float(rewards[0, chosen])
         state = states[chosen]
     return float(returns[chosen])
-
-
-def _starts(seeds: Iterable[int]) -> NDArray[np.float64]:
-    """The states [N, 2] (θ in rad, θ̇ in rad/s) that Gymnasium draws."""
-    env = make_environment("Pendulum-v1", gravity=1.0).unwrapped
-    states = []
-    for seed in seeds:
-        env.reset(seed=seed)
-        states.append(env.state)  # type: ignore[attr-defined]
-    return np.array(states, np.float64).reshape(-1, 2)
 
 
 def _checked_gravity(gravity: float) -> float:
@@ -239,7 +229,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, help="folder for gravity_<g>.npz")
     options = parser.parse_args(arguments)
     steps = _checked_steps(options.steps)
-    starts = _starts(SHIPPED_SEEDS)
+    starts = pendulum_starts(SHIPPED_SEEDS)
     for gravity in map(_checked_gravity, options.gravity):
         returns = _best_return(gravity, starts, steps).tolist()
         path = options.out / _file_name(gravity, steps)

@@ -76,7 +76,7 @@ class Rollout:
         action, explored = agent.select_action(observation, self.epsilon, known)
         following, reward, terminated, truncated, _ = env.step(actions.control(action))
         reward = float(reward)
-        if not math.isfinite(reward + following.dot(following)):
+        if not math.isfinite(sum(following.tolist(), reward)):
             raise UserError(
                 f"episode {self.episode}, step {self.steps + 1}: the environment gave "
                 f"the reward {reward} and the observation {following}"

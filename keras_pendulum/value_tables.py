@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,9 @@ TORQUES = TorqueGrid().torques  # [41] N·m
 CELLS_PER_TORQUE = 3  # with 3, both one torque's effect and the 8 rad/s are whole cells
 SPEED_STEP = TIME_STEP * 3 * (TORQUES[1] - TORQUES[0]) / CELLS_PER_TORQUE  # 0.005 rad/s
 FINE_CELLS = 1600  # in [-π, 0]: resolves the cliffs that V has at g = 10
-STRIP = 64  # columns backed up at a time: what stays in the processor's own memory
+STRIP = 32  # columns backed up at a time: what stays in the processor's own memory
+
+_Tried = NDArray[np.float64]  # [N, 41]: of every torque, from N states
 
 
 def solve(
@@ -145,20 +148,42 @@ def greedy_return(
 
     Takes as many steps as there are `tables`; `tables[k]` serves the step with k to go after it.
     """
+
+    def choose(step: int, rewards: _Tried, thetas: _Tried, speeds: _Tried) -> NDArray[np.intp]:
+        return (rewards + value_at(tables[-1 - step], thetas, speeds)).argmax(axis=1)
+
+    return exact_return(choose, len(tables), gravity, starts)
+
+
+def exact_return(
+    choose: Callable[[int, _Tried, _Tried, _Tried], NDArray[Any]],
+    steps: int,
+    gravity: float,
+    starts: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Returns [N] of exact steps from `starts` [N, 2] (θ, θ̇).
+
+    Args:
+        choose: gives the torques' indices [N] from a step's number, the first being 0, and what
+            `try_torques` tells of every torque in it.
+        steps: of an episode.
+        gravity: g in m/s².
+        starts: θ in rad and θ̇ in rad/s.
+    """
     theta, speed = starts.T  # [N]
     total = np.zeros(len(starts))
     everyone = np.arange(len(starts))
-    for table in reversed(tables):
-        rewards, thetas, speeds = try_torques(gravity, theta, speed)  # [N, A]
-        best = (rewards + value_at(table, thetas, speeds)).argmax(axis=1)
-        total += rewards[everyone, best]
-        theta, speed = thetas[everyone, best], speeds[everyone, best]
+    for step in range(steps):
+        rewards, thetas, speeds = try_torques(gravity, theta, speed)
+        chosen = choose(step, rewards, thetas, speeds)
+        total += rewards[everyone, chosen]
+        theta, speed = thetas[everyone, chosen], speeds[everyone, chosen]
     return total
 
 
 def try_torques(
     gravity: float, theta: NDArray[np.float64], speed: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[_Tried, _Tried, _Tried]:
     """One exact step with every torque: rewards, next θ and next θ̇ [N, 41] from θ and θ̇ [N]."""
     # In Gymnasium's own order of operations: the last digits are then the same.
     pull = 3 * gravity / 2 * np.sin(theta)

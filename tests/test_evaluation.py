@@ -80,6 +80,17 @@ def test_random_torque_is_as_bad_as_published() -> None:
     assert random_return("Pendulum-v1", 1.0, 200) == pytest.approx(-909, rel=0.1)
 
 
+def test_random_torque_makes_gymnasiums_own_steps() -> None:
+    env, random = gymnasium.make("Pendulum-v1", g=10.0), np.random.RandomState(0)
+    torques = np.linspace(-2, 2, 41)
+    total = 0.0
+    for seed in range(3):
+        env.reset(seed=seed)
+        for _ in range(200):
+            total += float(env.step([random.choice(torques)])[1])
+    assert random_return("Pendulum-v1", 10.0, 200, episodes=3) == pytest.approx(total / 3, rel=1e-9)
+
+
 def test_random_episodes_have_the_steps_that_are_asked_for() -> None:
     one_step = random_return("Pendulum-v1", 1.0, 1)
     assert one_step == pytest.approx(-(np.pi**2 / 3 + 0.1 / 3 + 0.001 * 4 / 3), rel=0.2)
