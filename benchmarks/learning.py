@@ -2,26 +2,36 @@
 
     python -m benchmarks.learning [RUNS [PYTHON]]
 
-Whole processes in turns, one for each of the training seeds 0, 1, … (3 runs), all with the numbers
-of the preset `reference`; medians. This package's is the command `keras_pendulum.train` with all it
-does: checkpoints, picture, evaluation. The others only train and keep their weights. They run under
-PYTHON, that of an environment with the extra `bench`; by default the same as this package. Keras
-imports JAX where it finds it, so one of their own is fairer. What is not installed is left out.
+Processes in turns, one for each of the training seeds 0, 1, … (3 runs), all with the numbers of the
+preset `reference`; medians, from the start of a process until its final weights are kept, and until
+it ends. This package's is the command `keras_pendulum.train` with all it does: checkpoints, and
+afterwards a picture and an evaluation. The others do nothing but train. They run under PYTHON, that
+of an environment with the extra `bench`; by default the same as this package. Keras imports JAX
+where it finds it, so one of their own is fairer. What is not installed is left out.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks.report import Process, median, run_process, write
 
 PEERS = {"stable-baselines3": "sb3", "sbx-rl": "sbx"}  # package: name in benchmarks.peers
+
+
+class Training(NamedTuple):
+    """A process that has trained a network."""
+
+    kept: float  # s, from its start until its final weights were kept
+    process: Process
+    weights: Path
 
 
 def regret(weights: Path) -> float:
@@ -38,16 +48,24 @@ def regret(weights: Path) -> float:
     return kp.evaluate_policy(network, gravity=config.gravity).regret
 
 
+def medians(trainings: Sequence[Training]) -> tuple[float, float]:
+    """Seconds until the weights were kept, and of the whole processes."""
+    kept = [training.kept for training in trainings]
+    return median(kept, 3), median([training.process.seconds for training in trainings], 3)
+
+
 def main(runs: str = "3", python: str = sys.executable) -> None:
     """Trains all in turns and writes the table."""
-    done: dict[str, list[tuple[Process, Path]]] = {}
+    done: dict[str, list[Training]] = {}
     installed = run_process("-m", "benchmarks.peers", python=python).output.split("\n")
     with tempfile.TemporaryDirectory() as folder:
 
         def run(name: str, weights: Path, words: Sequence[str], python: str) -> None:
+            started = time.time()
             process = run_process("-m", *words, python=python)
-            done.setdefault(name, []).append((process, weights))
-            print(f"{name} {process.seconds:.1f} s", flush=True)
+            kept = weights.stat().st_mtime - started
+            done.setdefault(name, []).append(Training(kept, process, weights))
+            print(f"{name} {kept:.1f} s, {process.seconds:.1f} s", flush=True)
 
         for seed in map(str, range(int(runs))):
             out = Path(folder) / seed
@@ -61,20 +79,22 @@ def main(runs: str = "3", python: str = sys.executable) -> None:
                 if any(line.startswith(package) for line in installed):
                     weights = Path(folder) / f"{library}{seed}.npz"
                     run(package, weights, ["benchmarks.peers", library, seed, str(weights)], python)
-        regrets = {name: [regret(weights) for _, weights in each] for name, each in done.items()}
+        regrets = {name: [regret(one.weights) for one in each] for name, each in done.items()}
 
-    ours = median([process.seconds for process, _ in done["this package"]], 3)
+    our_kept, our_process = medians(done["this package"])
     rows: list[dict[str, Any]] = []
     for name, each in done.items():
-        seconds = median([process.seconds for process, _ in each], 3)
+        kept, process = medians(each)
         rows.append(
             {
                 "library": name,
-                "seconds": round(seconds, 1),
-                "this package's share of that": round(ours / seconds, 2),
+                "seconds until its weights are kept": round(kept, 1),
+                "this package's share of that": round(our_kept / kept, 2),
+                "seconds of the whole process": round(process, 1),
+                "its share of that": round(our_process / process, 2),
                 "mean regret": round(float(np.mean(regrets[name])), 1),
                 "worst regret": round(max(regrets[name]), 1),
-                "peak memory, MB": round(max(process.peak_memory for process, _ in each)),
+                "peak memory, MB": round(max(one.process.peak_memory for one in each)),
                 "runs": int(runs),
             }
         )

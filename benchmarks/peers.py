@@ -6,7 +6,8 @@
 Trains a DQN of Stable-Baselines3 (PyTorch) or of sbx (JAX) and keeps the network's weights in
 OUT.npz, in Keras's order. Needs the extra `bench`. The settings come from the preset. Where a
 library has no such setting, it keeps its own way: both take the Huber loss of the taken action, and
-update every few steps instead of after each episode.
+count the blend of the target network in steps, so that their updates, as many as here, come after
+a few steps each and not after the episode.
 """
 
 from __future__ import annotations
@@ -44,17 +45,18 @@ class DiscreteTorques(gymnasium.ActionWrapper[Any, Any, Any]):
 
 def settings(config: Config) -> dict[str, Any]:
     """The arguments that both libraries understand."""
-    steps_per_update = max(1, round(config.episode_steps / config.updates_per_episode))
+    times = math.gcd(config.episode_steps, config.updates_per_episode)  # in an episode
+    steps, updates = config.episode_steps // times, config.updates_per_episode // times
     return {
         "env": DiscreteTorques(config),
         "buffer_size": config.replay_capacity,
         "learning_starts": (config.learning_starts + 1) * config.episode_steps,
         "batch_size": config.batch_size,
         "gamma": config.discount,
-        "tau": config.target_blend,
-        "target_update_interval": steps_per_update,
-        "train_freq": (steps_per_update, "step"),
-        "gradient_steps": 1,
+        "tau": 1 - (1 - config.target_blend) ** updates,
+        "target_update_interval": steps,
+        "train_freq": (steps, "step"),
+        "gradient_steps": updates,
         "seed": config.seed,
         "device": "cpu",
     }
