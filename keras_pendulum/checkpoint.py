@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict, fields
+from dataclasses import fields
 from typing import Any
 
 import h5py
@@ -79,7 +80,7 @@ def _snapshot(run: Run) -> tuple[bytes, dict[str, Arrays]]:
     """A checkpoint's content, and what of it has still to be checked."""
     online, agent = run.agent.get_state()
     state = {
-        "config": asdict(run.config),
+        "config": vars(run.config),
         "random": run.random.get_state(),
         "environment": run.env.unwrapped.np_random.bit_generator.state,
         "replay_added": run.replay.added,
@@ -93,7 +94,7 @@ def _snapshot(run: Run) -> tuple[bytes, dict[str, Arrays]]:
         run={
             # JSON as an array: an attribute can hold no more than 64 KB.
             "state": np.frombuffer(json.dumps(state).encode(), np.uint8),
-            "history": np.array(run.history, np.float64).reshape(-1, len(EpisodeRecord._fields)),
+            "history": _rows(run.history),
         },
     )
     return content, agent
@@ -169,6 +170,11 @@ def _state(file: h5py.File, path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _arrays(file: h5py.File, group: str, path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     return {name: layer_files.read_array(entry, path) for name, entry in file[group].items()}
+
+
+def _rows(history: list[EpisodeRecord]) -> NDArray[np.float64]:
+    numbers = np.fromiter(itertools.chain.from_iterable(history), np.float64)  # soon done
+    return numbers.reshape(-1, len(EpisodeRecord._fields))
 
 
 def _record(row: NDArray[np.float64]) -> EpisodeRecord:

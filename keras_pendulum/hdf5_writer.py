@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5p, h5s, h5t
 from numpy.typing import ArrayLike, NDArray
 
-_STEP = 2**23  # bytes of memory taken at a time
+_IN_MEMORY = h5p.create(h5p.FILE_ACCESS)
+_IN_MEMORY.set_fapl_core(2**23, backing_store=False)  # so many bytes are taken at a time
 _WITHOUT_TIMES = h5p.create(h5p.DATASET_CREATE)  # the same arrays make the same file
 _WITHOUT_TIMES.set_obj_track_times(False)
 
@@ -22,9 +24,7 @@ _WITHOUT_TIMES.set_obj_track_times(False)
 @contextmanager
 def file_in_memory() -> Iterator[h5f.FileID]:
     """A new file that no disk will hold; its bytes come from `image`, inside the `with` block."""
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fapl_core(_STEP, backing_store=False)
-    file = h5f.create(b"weights", h5f.ACC_TRUNC, fapl=access)
+    file = h5f.create(b"weights", h5f.ACC_TRUNC, fapl=_IN_MEMORY)
     try:
         yield file
     finally:
@@ -64,4 +64,9 @@ def add_attributes(holder: h5f.FileID | h5g.GroupID, values: Mapping[str, ArrayL
 
 
 def _type_and_shape(array: NDArray[Any]) -> tuple[h5t.TypeID, h5s.SpaceID]:
-    return h5t.py_create(array.dtype, logical=True), h5s.create_simple(array.shape)
+    return _type(array.dtype), h5s.create_simple(array.shape)
+
+
+@cache
+def _type(dtype: np.dtype[Any]) -> h5t.TypeID:
+    return h5t.py_create(dtype, logical=True)
