@@ -4,7 +4,7 @@
 
 Trains arms, written as for the study (by default those that README gives figures for), with the
 training seeds 100, 101, … (16 seeds), two at a time, and evaluates each greedily on the starts of
-seeds 1000 to 1299. Six minutes on two cores.
+seeds 1000 to 1299. Eight minutes on two cores.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ ARMS = (
     "22 updates: reference updates_per_episode=22",
     "24 updates of 2e-3: reference updates_per_episode=24 learning_rate=2e-3",
     "22 updates with Huber's loss: reference updates_per_episode=22 loss=huber",
+    "30 updates from PyTorch's initial weights: reference initial_weights=fan-in",
 )
 
 
