@@ -60,7 +60,7 @@ def quick_import() -> Iterator[None]:
 
     TensorFlow makes so many objects that live until the end that the garbage collector, looking
     through them again and again and once more at exit, takes longer than half of the import itself.
-    And Keras imports Matplotlib for galleries of images that nobody here shows.
+    And Keras imports pyplot for galleries of images, which nobody here shows; it gets it for those.
     """
     imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
     gc.disable()

@@ -51,9 +51,7 @@ def run(code: str, *arguments: Path) -> None:
         "assert matplotlib.pyplot.figure() and matplotlib.patches.Patch()",
     ],
 )
-def test_keras_comes_without_matplotlib_and_gets_it_when_used(
-    afterwards: str, tmp_path: Path
-) -> None:
+def test_keras_comes_without_pyplot_and_gets_it_when_used(afterwards: str, tmp_path: Path) -> None:
     imports = "import sys, numpy as np, keras_pendulum\nkeras_pendulum.DQN\nimport keras\n"
     run(imports + afterwards, tmp_path / "picture.png")
 
