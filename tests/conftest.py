@@ -83,11 +83,7 @@ def command(tmp_path: Path) -> Command:
             timeout=300,
             check=False,
         )
-        # The whole tensorflow package, which Keras 2 brings into the environment of the tests,
-        # notes that it finds no GPU; tensorflow-cpu is silent (tests/test_packaging.py).
-        done.stderr = re.sub(
-            r"^(WARNING: All log messages|I\d{4} ).*\n", "", done.stderr, flags=re.M
-        )
+        done.stderr = without_gpu_note(done.stderr)
         return done
 
     return run
@@ -119,6 +115,15 @@ def refusal(
         return printed.err
 
     return told
+
+
+def without_gpu_note(output: str) -> str:
+    """What a process printed, but for the note of the whole tensorflow package: it finds no GPU.
+
+    Keras 2 brings that package into the tests' environment; tensorflow-cpu is silent
+    (tests/test_packaging.py).
+    """
+    return re.sub(r"^(WARNING: All log messages|I\d{4} ).*\n", "", output, flags=re.M)
 
 
 def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]:
