@@ -146,9 +146,10 @@ class Window:
         self._screen.blit(drawn, (place[0] - round(align * drawn.get_width()), place[1]))
 
 
-def play(game: Game, window: Window) -> None:
-    """Keys to the game and its views to the window, until the player leaves."""
+def play(game: Game, window: Window, check: Callable[[], None]) -> None:
+    """Keys to the game and its views to the window, until the player leaves or `check` raises."""
     while True:
+        check()
         for key in window.pressed():
             game.press(key)
             if game.over:

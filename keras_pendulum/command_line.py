@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -27,6 +28,34 @@ class OneLineParser(argparse.ArgumentParser):
 
             argcomplete.autocomplete(self)
         return super().parse_args(*words)
+
+
+class ControlC:
+    """Within its `with` block Ctrl-C is a KeyboardInterrupt that does not get lost.
+
+    pygame's C code may drop the exception on its way; `check` raises it again.
+    """
+
+    def __init__(self) -> None:
+        self._came = False
+        self._before = signal.getsignal(signal.SIGINT)
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt once Ctrl-C has been pressed."""
+        if self._came:
+            raise KeyboardInterrupt
+
+    def __enter__(self) -> ControlC:
+        if self._before is signal.default_int_handler:  # else it is ignored, or somebody else's
+            signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _note(self, number: int, frame: object) -> None:
+        self._came = True
+        self.check()
 
 
 def run_command(command: Callable[[], int]) -> int:

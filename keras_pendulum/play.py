@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.backend import quick_import, require_tensorflow
-from keras_pendulum.command_line import OneLineParser, name, run_command
+from keras_pendulum.command_line import ControlC, OneLineParser, name, run_command
 from keras_pendulum.config import checked_setting
 from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
@@ -91,7 +91,8 @@ def _drive(
     game = Game(gravity, seed, agent, tell=tell, print_steps=print_steps)
     guard.before_end = lambda: game.press(Key.LEAVE)
     try:
-        play(game, Window(guard))
+        with ControlC() as control_c:
+            play(game, Window(guard), control_c.check)
     finally:
         game.close()  # and the window with it
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
@@ -21,9 +22,10 @@ from conftest import Command, Refusal, command_line
 
 import keras_pendulum as kp
 from keras_pendulum import cockpit, evaluate, play
+from keras_pendulum.command_line import ControlC
 from keras_pendulum.driving import Drive, Policy
 from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
-from keras_pendulum.game import READY_FRAMES, Game
+from keras_pendulum.game import READY_FRAMES, Game, Key
 from keras_pendulum.lost_window import LossGuard
 
 NO_SCREEN = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
@@ -83,7 +85,7 @@ def played(keys: Mapping[int, Any], **settings: Any) -> Player:
         **{"gravity": 1.0, "seed": 3, "print_steps": True} | settings, tell=player.lines.append
     )
     window = cockpit.Window(LossGuard(), player.tick)
-    cockpit.play(game, window)
+    cockpit.play(game, window, lambda: None)
     game.close()
     return player
 
@@ -487,6 +489,34 @@ def test_control_c_ends_it(screen: Screen, tmp_path: Path) -> None:
         game.process.send_signal(signal.SIGINT)
         assert game.end() == 130
     assert game.err == ""
+
+
+def test_a_control_c_that_was_dropped_on_its_way_ends_it_at_the_next_frame() -> None:
+    class Unseen:
+        """A window that drops what comes while it shows the second frame, as pygame may."""
+
+        shown = 0
+
+        def pressed(self) -> list[Key]:
+            return []
+
+        def show(self, view: object) -> None:
+            self.shown += 1
+            assert self.shown < 10, "the game does not end"
+            if self.shown == 2:
+                with contextlib.suppress(KeyboardInterrupt):
+                    signal.raise_signal(signal.SIGINT)
+
+    window: Any = Unseen()
+    game = Game(1.0, 5)
+    before = signal.getsignal(signal.SIGINT)
+    # As in a program that was not started with Ctrl-C ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with ControlC() as control_c, pytest.raises(KeyboardInterrupt):
+        cockpit.play(game, window, control_c.check)
+    game.close()
+    assert window.shown == 2
+    assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
 class Watching(Playing):
