@@ -1,4 +1,4 @@
-"""How the settings of `reference` were chosen: by seeds that no result is reported on.
+"""How the updates of `reference` were chosen: by seeds that no result is reported on.
 
     python -m benchmarks.choosing [SEEDS ['NAME: PRESET field=value …' …]]
 
@@ -15,12 +15,14 @@ from benchmarks.departures import trained
 from benchmarks.report import write
 from keras_pendulum.arms import own_arms
 
+# When they were compared, the updates still came between the episodes.
+_REFERENCE = "reference update_after=episode"
 ARMS = (
-    "30 updates: reference",
-    "22 updates: reference updates_per_episode=22",
-    "24 updates of 2e-3: reference updates_per_episode=24 learning_rate=2e-3",
-    "22 updates with Huber's loss: reference updates_per_episode=22 loss=huber",
-    "30 updates from PyTorch's initial weights: reference initial_weights=fan-in",
+    f"30 updates: {_REFERENCE}",
+    f"22 updates: {_REFERENCE} updates_per_episode=22",
+    f"24 updates of 2e-3: {_REFERENCE} updates_per_episode=24 learning_rate=2e-3",
+    f"22 updates with Huber's loss: {_REFERENCE} updates_per_episode=22 loss=huber",
+    f"30 updates from PyTorch's initial weights: {_REFERENCE} initial_weights=fan-in",
 )
 
 

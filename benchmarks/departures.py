@@ -25,7 +25,7 @@ BEFORE = {"reference": "original", "swingup": "reference", "cartpole": "cartpole
 _NOT_COUNTED = ("preset", "gravity")
 # What makes no sense without a departure is taken back with it: after each step it is not known
 # how many updates there will be for a cosine to fall over.
-_TAKEN_BACK_TOO = {"update_after": ("learning_rate_schedule",)}
+_TAKEN_BACK_TOO = {("cartpole", "update_after"): ("learning_rate_schedule",)}
 
 
 def departures(preset: str) -> list[str]:
@@ -73,7 +73,7 @@ def main(preset: str = "reference", seeds: str = "5") -> None:
     ours, theirs = kp.preset(preset), kp.preset(BEFORE[preset])
     variants = {BEFORE[preset]: replace(theirs, gravity=ours.gravity), preset: ours}
     for name in departures(preset):
-        back = (name, *_TAKEN_BACK_TOO.get(name, ()))
+        back = (name, *_TAKEN_BACK_TOO.get((preset, name), ()))
         variants[name] = replace(ours, **{each: getattr(theirs, each) for each in back})
     rows = trained(variants, range(int(seeds)), range(100))
     write(f"departures_{preset}", f"python -m benchmarks.departures {preset} {seeds}", rows)

@@ -5,9 +5,10 @@
 Processes in turns, one for each of the training seeds 0, 1, … (3 runs), all with the numbers of the
 preset `reference`; medians, from the start of a process until its final weights are kept, and until
 it ends. This package's is the command `keras_pendulum.train` with all it does: checkpoints, and
-afterwards a picture and an evaluation. The others do nothing but train. They run under PYTHON, that
-of an environment with the extra `bench`; by default the same as this package. Keras imports JAX
-where it finds it, so one of their own is fairer. What is not installed is left out.
+afterwards a picture and an evaluation; and once more with its updates between the episodes, not
+beside them. The others do nothing but train. They run under PYTHON, that of an environment with the
+extra `bench`; by default the same as this package. Keras imports JAX where it finds it, so one of
+their own is fairer. What is not installed is left out.
 """
 
 from __future__ import annotations
@@ -23,6 +24,11 @@ import numpy as np
 
 from benchmarks.report import Process, median, run_process, write
 
+# Rows of this package, with the flags of each; the shares are those of the first.
+OURS = {
+    "this package": (),
+    "this package, learning between the episodes": ("--update-after", "episode"),
+}
 PEERS = {"stable-baselines3": "sb3", "sbx-rl": "sbx"}  # package: name in benchmarks.peers
 
 
@@ -68,20 +74,17 @@ def main(runs: str = "3", python: str = sys.executable) -> None:
             print(f"{name} {kept:.1f} s, {process.seconds:.1f} s", flush=True)
 
         for seed in map(str, range(int(runs))):
-            out = Path(folder) / seed
-            run(
-                "this package",
-                out / "pendulum_weight.h5",
-                ["keras_pendulum.train", "--seed", seed, "--out", str(out)],
-                sys.executable,
-            )
+            for name, flags in OURS.items():
+                out = Path(folder) / seed / name
+                words = ["keras_pendulum.train", "--seed", seed, "--out", str(out), *flags]
+                run(name, out / "pendulum_weight.h5", words, sys.executable)
             for package, library in PEERS.items():
                 if any(line.startswith(package) for line in installed):
                     weights = Path(folder) / f"{library}{seed}.npz"
                     run(package, weights, ["benchmarks.peers", library, seed, str(weights)], python)
         regrets = {name: [regret(one.weights) for one in each] for name, each in done.items()}
 
-    our_kept, our_process = medians(done["this package"])
+    our_kept, our_process = medians(done[next(iter(OURS))])
     rows: list[dict[str, Any]] = []
     for name, each in done.items():
         kept, process = medians(each)
@@ -89,9 +92,9 @@ def main(runs: str = "3", python: str = sys.executable) -> None:
             {
                 "library": name,
                 "seconds until its weights are kept": round(kept, 1),
-                "this package's share of that": round(our_kept / kept, 2),
+                "this package's share": round(our_kept / kept, 2),
                 "seconds of the whole process": round(process, 1),
-                "its share of that": round(our_process / process, 2),
+                "this package's share of the process": round(our_process / process, 2),
                 "mean regret": round(float(np.mean(regrets[name])), 1),
                 "worst regret": round(max(regrets[name]), 1),
                 "peak memory, MB": round(max(one.process.peak_memory for one in each)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import keras
@@ -63,6 +64,7 @@ class Agent:
         # By what they compute and the shapes of what goes in, which stay the same during a run.
         self._compiled: dict[tuple[Any, ...], Callable[..., Any]] = {}
         self._greedy: GreedyPolicy | None = None
+        self._thread = ThreadPoolExecutor(1)
 
     def select_action(
         self, observation: NDArray[np.float32], epsilon: float, known: int | None = None
@@ -82,7 +84,7 @@ class Agent:
         return self.policy().action(observation) if known is None else known, False
 
     def policy(self) -> GreedyPolicy:
-        """The greedy policy of the weights since the last update."""
+        """The greedy policy of the weights since the last update that is finished."""
         if self._greedy is None:
             self._greedy = GreedyPolicy(self.online)
         return self._greedy
@@ -92,8 +94,22 @@ class Agent:
 
         One compiled call makes all K updates, because a call each costs more than its update.
         """
-        (losses,) = self._call(self._updates, _packed(batches))
+        (losses,), self._greedy = self._call(self._updates, _packed(batches))
         return losses
+
+    def begin_update(self, batches: Transitions) -> Callable[[], NDArray[np.float32]]:
+        """As `update`, on a thread of its own; returns what waits for its end and gives the losses.
+
+        Until that is called, the policy is the one from before.
+        """
+        self.policy()
+        call = self._thread.submit(self._call, self._updates, _packed(batches))
+
+        def finish() -> NDArray[np.float32]:
+            (losses,), self._greedy = call.result()
+            return losses
+
+        return finish
 
     def update_between(
         self, batches: Transitions, observations: NDArray[np.float32], actions: list[int]
@@ -114,11 +130,14 @@ class Agent:
         acted = np.zeros_like(rows[:, :1])
         acted[:, 0, : observations.shape[-1]] = observations
         acted[:, 0, -1] = actions
-        losses, made = self._call(self._updates_between, np.concatenate([rows, acted], axis=1))
+        rows = np.concatenate([rows, acted], axis=1)
+        (losses, made), self._greedy = self._call(self._updates_between, rows)
         return losses[:made]
 
-    def _call(self, compute: Callable[..., Any], rows: NDArray[np.float32]) -> list[Any]:
-        """What `compute` makes of rows, compiled; the weights after it are those to act on."""
+    def _call(
+        self, compute: Callable[..., Any], rows: NDArray[np.float32]
+    ) -> tuple[list[Any], GreedyPolicy]:
+        """What `compute` makes of rows, compiled, and the policy of the weights after it."""
         key = (compute, rows.shape)
         first = key not in self._compiled
         if first:
@@ -132,8 +151,7 @@ class Agent:
         if first:
             give_back_freed_memory()
         weights = self._variables.split("online", numbers(online))
-        self._greedy = GreedyPolicy(self.online, weights)
-        return [each.numpy() for each in found]
+        return [each.numpy() for each in found], GreedyPolicy(self.online, weights)
 
     def _updates(self, rows: tf.Tensor) -> tuple[tf.Tensor]:
         losses = tf.scan(

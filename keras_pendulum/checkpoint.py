@@ -7,7 +7,7 @@ import json
 import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -19,6 +19,7 @@ from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import ConfigError, WeightsError
 from keras_pendulum.flat_variables import Arrays
 from keras_pendulum.integrity import write_sealed
+from keras_pendulum.network import DQN
 from keras_pendulum.run import Run
 from keras_pendulum.weights import require_finite, weights_file
 
@@ -32,14 +33,14 @@ def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
     Raises UserError when the file cannot be written, or a weight or a variable of the optimizer is
     not finite; an old checkpoint is then unharmed.
     """
-    _write(path, *_snapshot(run))
+    _write(path, _snapshot(run))
 
 
 class CheckpointWriter:
     """Saves a run while it goes on.
 
-    The run waits until there is a file's content; a thread of its own checks it, takes the digest
-    and writes to the disk. Leaving the `with` block waits for the last one.
+    The run waits until its state is copied; a thread of its own makes the file. Leaving the `with`
+    block waits for the last one.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -55,7 +56,7 @@ class CheckpointWriter:
         """
         snapshot = _snapshot(run)
         self._wait()
-        self._last = self._thread.submit(_write, self.path, *snapshot)
+        self._last = self._thread.submit(_write, self.path, snapshot)
 
     def _wait(self) -> None:
         if self._last is not None:
@@ -70,14 +71,18 @@ class CheckpointWriter:
             self._wait()
 
 
-def _write(path: str | os.PathLike[str], content: bytes, agent: dict[str, Arrays]) -> None:
-    for arrays in agent.values():
-        require_finite(arrays.values())
-    write_sealed(path, content)
+class _Snapshot(NamedTuple):
+    """A run as it stood; nothing in it changes when the run goes on."""
+
+    network: DQN  # tells what it is; its weights then are `online`
+    online: list[NDArray[np.float32]]
+    agent: dict[str, Arrays]
+    replay: Arrays
+    state: dict[str, Any]
+    history: list[EpisodeRecord]
 
 
-def _snapshot(run: Run) -> tuple[bytes, dict[str, Arrays]]:
-    """A checkpoint's content, and what of it has still to be checked."""
+def _snapshot(run: Run) -> _Snapshot:
     online, agent = run.agent.get_state()
     state = {
         "config": vars(run.config),
@@ -85,19 +90,26 @@ def _snapshot(run: Run) -> tuple[bytes, dict[str, Arrays]]:
         "environment": run.env.unwrapped.np_random.bit_generator.state,
         "replay_added": run.replay.added,
     }
+    replay = run.replay.get_state()
+    return _Snapshot(run.agent.online, online, agent, replay, state, list(run.history))
+
+
+def _write(path: str | os.PathLike[str], snapshot: _Snapshot) -> None:
+    for arrays in snapshot.agent.values():
+        require_finite(arrays.values())
     content = weights_file(
-        run.agent.online,
-        online,
-        target=agent["target"],
-        optimizer=agent["optimizer"],
-        replay=run.replay.get_state(),
+        snapshot.network,
+        snapshot.online,
+        target=snapshot.agent["target"],
+        optimizer=snapshot.agent["optimizer"],
+        replay=snapshot.replay,
         run={
             # JSON as an array: an attribute can hold no more than 64 KB.
-            "state": np.frombuffer(json.dumps(state).encode(), np.uint8),
-            "history": _rows(run.history),
+            "state": np.frombuffer(json.dumps(snapshot.state).encode(), np.uint8),
+            "history": _rows(snapshot.history),
         },
     )
-    return content, agent
+    write_sealed(path, content)
 
 
 def load_config(path: str | os.PathLike[str]) -> Config:

@@ -91,20 +91,21 @@ class Config:
     )
     epsilon_min: float = setting(0.01, "ε never falls below this (original: 0.01)", low=0, high=1)
     update_after: str = setting(
-        "episode",
-        "when updates come: after each episode (original), or one after each step from the first "
+        "reset",
+        "when updates come: after each episode (original); after each reset, beside the episode's "
+        "steps, which act as if they were still to come; or one after each step from the first "
         "full batch on (notebooks)",
-        choices=("episode", "step"),
+        choices=("episode", "reset", "step"),
     )
     learning_starts: int = setting(
         40,
-        "update_after episode: for those with a higher number than this (original: 40)",
+        "update_after episode or reset: for episodes with a higher number than this (original: 40)",
         low=0,
         high=1_000_000,
     )
     updates_per_episode: int = setting(
         30,
-        "update_after episode: gradient updates (original: 1, `update-starvation`)",
+        "update_after episode or reset: gradient updates (original: 1, `update-starvation`)",
         low=1,
         high=10_000,
     )
@@ -172,12 +173,13 @@ class Config:
         self._check_task()
         if self.update_after == "step" and self.learning_rate_schedule == "cosine":
             raise ConfigError(
-                "learning_rate_schedule cosine needs update_after episode: how many steps, and so "
-                "updates, there will be is not known before"
+                "learning_rate_schedule cosine needs update_after episode or reset: how many "
+                "steps, and so updates, there will be is not known before"
             )
         stored = self.replay_capacity
-        if TASKS[self.environment].never_terminates and self.update_after == "episode":
-            stored = min(stored, (self.learning_starts + 2) * self.episode_steps)
+        if TASKS[self.environment].never_terminates and self.update_after != "step":
+            over = self.learning_starts + (1 if self.update_after == "reset" else 2)
+            stored = min(stored, over * self.episode_steps)
         if self.batch_size > stored:
             raise ConfigError(
                 f"batch_size {self.batch_size} is larger than the {stored} transitions that "
@@ -208,7 +210,7 @@ class Config:
 
     @property
     def total_updates(self) -> int:
-        """Updates that the whole run makes when they come after episodes."""
+        """Updates that the whole run makes when they come with episodes, not with steps."""
         return max(0, self.episodes - self.learning_starts - 1) * self.updates_per_episode
 
 

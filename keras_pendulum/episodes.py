@@ -13,6 +13,7 @@ from keras_pendulum.config import Config
 from keras_pendulum.errors import UserError
 from keras_pendulum.exploration import make_schedule
 from keras_pendulum.rehearsal import AHEAD, learn_each_step
+from keras_pendulum.replay import Transitions
 from keras_pendulum.rollout import Parts, Rollout
 
 
@@ -54,10 +55,11 @@ def learn_episodes(parts: Parts, last: EpisodeRecord | None = None) -> Iterator[
         rollout = Rollout(parts, schedule, episode)
         if config.update_after == "step":
             losses = learn_each_step(rollout, parts, ahead)
+        elif config.update_after == "reset":
+            losses = _learn_meanwhile(rollout, parts)
         else:
-            while not rollout.over:
-                rollout.step()
-            losses = _learn(parts) if episode > config.learning_starts else []
+            rollout.finish()
+            losses = _learn(rollout, parts)
         _check_losses(losses, rollout, config)
         updates += len(losses)
         yield EpisodeRecord(
@@ -72,17 +74,38 @@ def learn_episodes(parts: Parts, last: EpisodeRecord | None = None) -> Iterator[
         )
 
 
-def _learn(parts: Parts) -> list[float]:
+def _learn(rollout: Rollout, parts: Parts) -> list[float]:
     """The updates after an episode; returns their losses."""
-    _, _, agent, replay, random, config = parts
-    if len(replay) < config.batch_size:
+    batches = _batches(rollout, parts)
+    return [] if batches is None else parts.agent.update(batches).tolist()
+
+
+def _learn_meanwhile(rollout: Rollout, parts: Parts) -> list[float]:
+    """Plays an episode to its end while the updates go on; returns their losses.
+
+    They learn from the episodes before, and act from the next one on: so acting and learning have a
+    processor core each, and what comes of it does not depend on which is the faster.
+    """
+    batches = _batches(rollout, parts)
+    if batches is None:
+        rollout.finish()
         return []
-    positions = [
-        random.batch_positions(len(replay), config.batch_size)
-        for _ in range(config.updates_per_episode)
-    ]  # [K, B]
-    losses: list[float] = agent.update(replay.at(positions)).tolist()
-    return losses
+    finish_update = parts.agent.begin_update(batches)
+    rollout.finish()
+    return finish_update().tolist()
+
+
+def _batches(rollout: Rollout, parts: Parts) -> Transitions | None:
+    """The batches [K, B, ...] of the updates that belong to an episode; None without updates."""
+    _, _, _, replay, random, config = parts
+    if rollout.episode <= config.learning_starts or len(replay) < config.batch_size:
+        return None
+    return replay.at(
+        [
+            random.batch_positions(len(replay), config.batch_size)
+            for _ in range(config.updates_per_episode)
+        ]
+    )
 
 
 def _check_losses(losses: list[float], rollout: Rollout, config: Config) -> None:

@@ -1,7 +1,7 @@
 """HDF5 files made in memory, by h5py's low-level calls.
 
-A checkpoint is made in the middle of a run, which waits for it (benchmarks/saving.py), and h5py's
-usual calls would take longer.
+A checkpoint is made in the middle of a run, which goes on more slowly meanwhile, and h5py's usual
+calls would take longer.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ _ORIGINAL = replace(
     _REFERENCE,
     preset="original",
     replay_capacity=8000,
+    update_after="episode",
     updates_per_episode=1,
     learning_rate_schedule="constant",
     target_update="none",
@@ -40,6 +41,7 @@ _SWINGUP = replace(
     discount=0.98,
     reward_scale=0.02,
     epsilon_decay=0.997,
+    update_after="episode",
 )
 
 # The agent of the two PyTorch notebooks, with their numbers.

@@ -93,6 +93,11 @@ class Rollout:
         self.over = terminated or truncated
         return Step(action, explored, following)
 
+    def finish(self) -> None:
+        """Makes the steps that are left."""
+        while not self.over:
+            self.step()
+
     def snapshot(self) -> Callable[[], None]:
         """What, called later, takes back the steps made since."""
         env, _, _, replay, random, _ = self._parts

@@ -104,10 +104,15 @@ def test_a_batch_larger_than_the_buffer_is_refused() -> None:
         kp.preset("reference", batch_size=64, replay_capacity=50)
 
 
-def test_a_batch_larger_than_what_is_stored_at_the_first_update_is_refused() -> None:
-    kp.preset("reference", batch_size=400, learning_starts=0)
-    with pytest.raises(kp.ConfigError, match="batch_size 401 is larger than the 400 transitions"):
-        kp.preset("reference", batch_size=401, learning_starts=0)
+@pytest.mark.parametrize(("update_after", "stored"), [("episode", 400), ("reset", 200)])
+def test_a_batch_larger_than_what_is_stored_at_the_first_update_is_refused(
+    update_after: str, stored: int
+) -> None:
+    small = {"episodes": 2, "hidden_units": (8,), "learning_starts": 0}
+    fits = kp.preset("reference", update_after=update_after, batch_size=stored, **small)
+    assert [record.updates for record in kp.train_dqn(fits).history] == [0, 30]
+    with pytest.raises(kp.ConfigError, match=f"{stored + 1} is larger than the {stored} transi"):
+        dataclasses.replace(fits, batch_size=stored + 1)
 
 
 def test_the_swingup_is_the_reference_on_the_standard_task() -> None:

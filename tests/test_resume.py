@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from conftest import assert_same, command_line
 
 import keras_pendulum as kp
 from keras_pendulum.checkpoint import (
+    CheckpointWriter,
     load_checkpoint,
     load_config,
     save_checkpoint,
@@ -23,7 +25,7 @@ from keras_pendulum.checkpoint import (
 from keras_pendulum.run import Run
 
 
-@pytest.mark.parametrize("name", ["original", "cartpole-original"])
+@pytest.mark.parametrize("name", ["original", "reference", "cartpole-original"])
 def test_a_stopped_and_resumed_run_ends_like_one_never_stopped(name: str, tmp_path: Path) -> None:
     # A small buffer, so that its ring has wrapped round by then.
     config = kp.preset(name, episodes=50, replay_capacity=300 if "cartpole" in name else 3000)
@@ -200,6 +202,24 @@ def test_a_checkpoint_records_the_runs_settings(tmp_path: Path) -> None:
     config = kp.preset("walkthrough", gravity=2.5, seed=9)
     save_checkpoint(Run(config), tmp_path / "a.h5")
     assert load_config(tmp_path / "a.h5") == config
+
+
+def test_a_checkpoint_written_while_the_run_goes_on_is_of_where_it_was_begun(
+    tmp_path: Path,
+) -> None:
+    run = Run(kp.preset("reference", episodes=46, hidden_units=(8,), replay_capacity=3000))
+    episodes = run.episodes()
+    for _ in range(44):
+        next(episodes)
+    save_checkpoint(run, tmp_path / "at once.h5")
+    with CheckpointWriter(tmp_path / "later.h5") as writer:
+        gone_on = threading.Event()
+        writer._thread.submit(gone_on.wait)
+        writer.save(run)
+        assert len(list(episodes)) == 2
+        gone_on.set()
+    at_once, later = (tmp_path / name for name in ("at once.h5", "later.h5"))
+    assert later.read_bytes() == at_once.read_bytes()
 
 
 @pytest.mark.parametrize("part", ["online", "target", "optimizer"])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,11 @@ from conftest import assert_same, comparable
 from gymnasium.wrappers import TimeLimit
 
 import keras_pendulum as kp
+from keras_pendulum.agent import Agent
 from keras_pendulum.checkpoint import (
     load_checkpoint,
 )
+from keras_pendulum.replay import Transitions
 from keras_pendulum.run import Run
 from keras_pendulum.run_folder import RunFolder
 
@@ -27,6 +31,38 @@ SHORT: dict[str, Any] = {"episodes": 46}  # learning begins at episode 41
 def test_the_same_seed_twice_is_the_same_run_bit_for_bit(name: str) -> None:
     config = kp.preset(name, **SHORT)
     assert_same(kp.train_dqn(config), kp.train_dqn(config))
+
+
+@pytest.mark.parametrize("first", ["the update", "the episode"])
+def test_it_does_not_matter_whether_acting_or_learning_is_the_faster(
+    first: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A policy that changed as soon as it could would act otherwise here.
+    config = kp.preset(
+        "reference", hidden_units=(8,), learning_rate=0.02, epsilon_start=0.0, **SHORT
+    )
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        whole = kp.train_dqn(config)
+    finally:
+        sys.setswitchinterval(interval)
+
+    def begin_update(self: Agent, batches: Transitions) -> Callable[[], Any]:
+        if first == "the episode":
+            return lambda: self.update(batches)
+        before = self.policy()
+        losses = self.update(batches)
+        after, self._greedy = self._greedy, before
+
+        def finish() -> Any:
+            self._greedy = after
+            return losses
+
+        return finish
+
+    monkeypatch.setattr(Agent, "begin_update", begin_update)
+    assert_same(kp.train_dqn(config), whole)
 
 
 def test_another_seed_starts_from_other_weights_and_another_state() -> None:
