@@ -2,10 +2,13 @@
 
     python -m benchmarks.as_first_written [EPISODES]
 
-It stands on its own, so that the package's settings of TensorFlow do not reach it. Kept from the
-final listing: the network, a deque of tuples, the loop over the batch, and the update under
-`GradientTape`. Added: the recorded run's seeds and initial weights, so that the lines it prints
-can be held against the record, and the number of lines to print.
+Kept from the final listing: the network, a deque of tuples, the loop over the batch, and the
+update under `GradientTape`. Added: the recorded run's seeds and initial weights, so that the lines
+it prints can be held against the record, and the number of lines to print.
+
+It imports nothing of the package. Started by `benchmarks.original_run` it has the package's
+settings of TensorFlow (one thread for a product, no oneDNN): no slower, and so both make the same
+run. With TensorFlow's own settings its last digits can part it from the record sooner.
 """
 
 from __future__ import annotations

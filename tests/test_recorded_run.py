@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +83,19 @@ def test_the_command_prints_the_recorded_lines(
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[:STRICT_EPISODES] == recorded_lines[:STRICT_EPISODES]
+
+
+def test_the_program_as_first_written_prints_the_recorded_lines(recorded_lines: list[str]) -> None:
+    """What the benchmarks hold the package against; its episodes 41 to 43 make an update each."""
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.as_first_written", "44"],
+        cwd=Path(__file__).parents[1],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == recorded_lines[:44]
 
 
 def test_the_recorded_weights_file_gives_the_recorded_q_values(recorded: Recorded) -> None:
