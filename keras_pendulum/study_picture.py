@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _Style = tuple[str, Any, str]  # colour, line, marker
-# Okabe and Ito's colours, each with a line and a marker of its own: without colour these tell the
-# arms apart.
-_STYLES: tuple[_Style, ...] = (
+# Okabe and Ito's colours, a brown for their yellow, which is faint on white; each with a line and a
+# marker of its own: without colour these tell the arms apart.
+STYLES: tuple[_Style, ...] = (
     ("black", "-", "s"),
     ("#0072B2", "-", "o"),
     ("#D55E00", "--", "^"),
@@ -28,6 +28,7 @@ _STYLES: tuple[_Style, ...] = (
     ("#CC79A7", ":", "D"),
     ("#E69F00", (0, (5, 1, 1, 1, 1, 1)), "P"),
     ("#56B4E9", (0, (1, 1)), "X"),
+    ("#8C510A", (0, (8, 2)), "*"),
 )
 _PLAIN: _Style = ("0.45", "-", "o")
 
@@ -44,8 +45,8 @@ def study_figure(rows: Sequence[Row], results: Mapping[str, Sequence[Result]]) -
     """
     from matplotlib.figure import Figure
 
-    drawn = [row for row in rows if row.arm.curve][: len(_STYLES)]
-    styles = {row.arm.name: style for row, style in zip(drawn, _STYLES, strict=False)}
+    drawn = [row for row in rows if row.arm.curve][: len(STYLES)]
+    styles = {row.arm.name: style for row, style in zip(drawn, STYLES, strict=False)}
     tasks = list(dict.fromkeys(row.arm.task for row in drawn))
     height = max(6.5, 1.5 + 0.55 * len(rows), 4.0 * len(tasks))
     figure = Figure(figsize=(13, height), layout="constrained")

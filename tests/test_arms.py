@@ -10,6 +10,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.arms import default_arms, own_arms
 from keras_pendulum.errors import ConfigError
+from keras_pendulum.study_picture import STYLES
 
 
 def test_the_default_study_goes_from_original_to_reference_one_change_at_a_time() -> None:
@@ -34,6 +35,10 @@ def test_each_change_is_left_out_of_reference_and_equal_arms_share_their_runs() 
     assert all(arm.against == "reference" for arm in left_out)
     assert len({arm.training for arm in arms}) == len(arms) - 1
     assert len({arm.slug for arm in arms}) == len(arms)
+
+
+def test_each_arm_that_shall_have_a_curve_finds_a_style_for_it() -> None:
+    assert len([arm for arm in default_arms() if arm.curve]) <= len(STYLES)
 
 
 def test_an_own_arm_is_a_preset_with_settings() -> None:
