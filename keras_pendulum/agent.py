@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import keras
@@ -11,7 +12,7 @@ import numpy as np
 import tensorflow as tf
 from numpy.typing import NDArray
 
-from keras_pendulum.backend import give_back_freed_memory
+from keras_pendulum.backend import give_back_freed_memory, keeps_to_one_thread
 from keras_pendulum.flat_variables import Arrays, FlatVariables, numbers
 from keras_pendulum.network import DQN
 from keras_pendulum.policy import GreedyPolicy
@@ -100,13 +101,15 @@ class Agent:
     def begin_update(self, batches: Transitions) -> Callable[[], NDArray[np.float32]]:
         """As `update`, on a thread of its own; returns what waits for its end and gives the losses.
 
-        Until that is called, the policy is the one from before.
+        Until that is called, the policy is the one from before. A process that keeps to one thread
+        makes the updates then.
         """
         self.policy()
-        call = self._thread.submit(self._call, self._updates, _packed(batches))
+        call = partial(self._call, self._updates, _packed(batches))
+        result = call if keeps_to_one_thread() else self._thread.submit(call).result
 
         def finish() -> NDArray[np.float32]:
-            (losses,), self._greedy = call.result()
+            (losses,), self._greedy = result()
             return losses
 
         return finish

@@ -45,6 +45,11 @@ def keep_to_one_thread() -> None:
         os.environ[f"{name}_THREADS"] = "1"
 
 
+def keeps_to_one_thread() -> bool:
+    """Whether this process is to do nothing beside what it does: what `keep_to_one_thread` asks."""
+    return os.environ.get("TF_NUM_INTEROP_THREADS") == "1"
+
+
 def require_tensorflow() -> None:
     """Raises UserError when Keras was asked to run on another backend."""
     backend = os.environ["KERAS_BACKEND"]

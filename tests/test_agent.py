@@ -51,12 +51,17 @@ def test_after_an_update_it_acts_on_the_new_weights_and_keeps_them_until_the_nex
     assert (run.agent.policy().q_values(OBSERVATION) != values).any()
 
 
-def test_it_acts_on_the_old_weights_until_an_update_that_it_began_is_finished() -> None:
+@pytest.mark.parametrize("threads", [1, 2])
+def test_it_acts_on_the_old_weights_until_an_update_that_it_began_is_finished(
+    threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TF_NUM_INTEROP_THREADS", str(threads))
     run, batches = small_run()
     acting = run.agent.policy()
     finish = run.agent.begin_update(batches)
     assert run.agent.policy() is acting
     losses = finish()
+    assert len(run.agent._thread._threads) == threads - 1
     twin, _ = small_run()
     np.testing.assert_array_equal(losses, twin.agent.update(batches))
     ours, theirs = (each.agent.policy().q_values(OBSERVATION) for each in (run, twin))
