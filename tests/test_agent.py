@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.backend import keep_to_one_thread
 from keras_pendulum.policy import GreedyPolicy
 from keras_pendulum.replay import Transitions
 from keras_pendulum.run import Run
@@ -55,7 +58,9 @@ def test_after_an_update_it_acts_on_the_new_weights_and_keeps_them_until_the_nex
 def test_it_acts_on_the_old_weights_until_an_update_that_it_began_is_finished(
     threads: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("TF_NUM_INTEROP_THREADS", str(threads))
+    monkeypatch.setattr(os, "environ", {**os.environ, "TF_NUM_INTEROP_THREADS": "2"})
+    if threads == 1:
+        keep_to_one_thread()
     run, batches = small_run()
     acting = run.agent.policy()
     finish = run.agent.begin_update(batches)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,9 +16,8 @@ from gymnasium.wrappers import TimeLimit
 
 import keras_pendulum as kp
 from keras_pendulum.agent import Agent
-from keras_pendulum.checkpoint import (
-    load_checkpoint,
-)
+from keras_pendulum.backend import keep_to_one_thread
+from keras_pendulum.checkpoint import load_checkpoint
 from keras_pendulum.replay import Transitions
 from keras_pendulum.run import Run
 from keras_pendulum.run_folder import RunFolder
@@ -41,6 +41,7 @@ def test_it_does_not_matter_whether_acting_or_learning_is_the_faster(
     config = kp.preset(
         "reference", hidden_units=(8,), learning_rate=0.02, epsilon_start=0.0, **SHORT
     )
+    monkeypatch.delenv("TF_NUM_INTEROP_THREADS", raising=False)  # else no thread would learn
     interval = sys.getswitchinterval()
     sys.setswitchinterval(1e-5)
     try:
@@ -49,7 +50,8 @@ def test_it_does_not_matter_whether_acting_or_learning_is_the_faster(
         sys.setswitchinterval(interval)
 
     if first == "the episode":
-        monkeypatch.setenv("TF_NUM_INTEROP_THREADS", "1")
+        monkeypatch.setattr(os, "environ", dict(os.environ))
+        keep_to_one_thread()
     else:
         monkeypatch.setattr(Agent, "begin_update", update_at_once)
     assert_same(kp.train_dqn(config), whole)
