@@ -166,8 +166,9 @@ def evaluate_reference(python: str | Path, folder: Path, **environment: str) -> 
 
 
 def pip_install(python: str | Path, folder: Path, *words: str | Path) -> None:
+    # Python itself makes the byte code of what is imported, which is far from all.
     succeed(
-        [python, "-m", "pip", "install", "--quiet", *words],
+        [python, "-m", "pip", "install", "--quiet", "--no-compile", *words],
         folder,
         "pip could not install; dependencies need a package registry that pip can reach",
     )
