@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
@@ -72,8 +73,38 @@ def test_the_text_beside_a_table_has_the_measured_regrets_too(preset: str) -> No
     assert f"of `{BEFORE[preset]}` {summary(regrets[BEFORE[preset]])}." in flowing
 
 
+def rows_of(name: str) -> list[dict[str, Any]]:
+    """The rows of a benchmark's table."""
+    rows: list[dict[str, Any]] = json.loads((RESULTS / f"{name}.json").read_text("utf-8"))["rows"]
+    return rows
+
+
+def test_the_speeds_in_the_text_are_those_of_the_tables() -> None:
+    first, ours = rows_of("original_run")
+    here, between, peer, other = rows_of("learning")
+    whole, kept = "seconds of the whole process", "seconds until its weights are kept"
+    small, large, step = rows_of("inner_loops")
+    cartpole, torch = rows_of("cartpole_speed")
+    steps = "environment steps a second"
+    for words in (
+        f"takes {ours['seconds']} s instead of {first['seconds']:.0f} s, "
+        f"{ours['times as fast']:.0f} times as fast.",
+        f"command takes {here[whole]:.0f} s, with its policy kept after {here[kept]:.0f}, where "
+        f"Stable-Baselines3 takes {peer[whole]:.0f} s and sbx {other[whole]:.0f} s",
+        f"(their mean regret {peer['mean regret']} and {other['mean regret']}, "
+        f"here {here['mean regret']}); with its updates between the episodes it takes "
+        f"{between[whole]:.0f} s.",
+        f"takes {small['ratio']} times what its matrix products",
+        f"at batch 128 {large['ratio']} times;",
+        f"included, {float(step['here'].split()[0]):.0f} µs, {step['bare'].split()[0]} of them",
+        f"makes {cartpole[steps]} {steps}, {cartpole['times as fast']} times as many as the one in "
+        f"PyTorch ({torch[steps]})",
+    ):
+        assert words in " ".join(README.split())
+
+
 def test_the_settings_not_taken_have_the_measured_regrets() -> None:
-    rows = json.loads((RESULTS / "choosing.json").read_text(encoding="utf-8"))["rows"]
+    rows = rows_of("choosing")
     assert [row["training"] for row in rows] == [arm.partition(":")[0] for arm in ARMS]
     for row in rows:
         assert f"{row['training']} {summary(row['regrets'])}" in " ".join(README.split())
