@@ -62,7 +62,7 @@ def main(episodes: int = 5000) -> None:
         )
     peak_row = dict.fromkeys(rows[0], "")
     rows.append({**peak_row, "episodes": "all", "resident memory, MB": f"peak {peak:.0f}"})
-    write("long_run", "python -m benchmarks.long_run", rows)
+    write("long_run", f"python -m benchmarks.long_run {episodes}", rows)
 
 
 if __name__ == "__main__":

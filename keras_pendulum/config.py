@@ -87,7 +87,7 @@ class Config:
         0.99, "episodes: factor on ε before each episode (original: 0.99)", low=0, high=1
     )
     epsilon_decay_steps: float = setting(
-        1000.0, "steps: ε - epsilon_min falls by e in so many (notebooks: 1000)", low=1, high=1e9
+        1000.0, "steps: ε - epsilon_min falls to 1/e in so many (notebooks: 1000)", low=1, high=1e9
     )
     epsilon_min: float = setting(0.01, "ε never falls below this (original: 0.01)", low=0, high=1)
     update_after: str = setting(
@@ -146,7 +146,7 @@ class Config:
     )
     target_blend: float = setting(
         0.1,
-        "soft: share of the online weights blended in after each update (tried out; no original)",
+        "soft: share of the online weights blended in after each update (notebooks: 0.005)",
         low=0,
         high=1,
     )

@@ -72,7 +72,7 @@ def optimal_return(
 ) -> NDArray[np.float64]:
     """The best possible undiscounted return of `steps` steps from each start `reset(seed=…)`.
 
-    Known returns are read in milliseconds. Others take some 15 s of solving, and are then kept in
+    Known returns are read in milliseconds. Others take some 20 s of solving, and are then kept in
     the user's cache folder (where that can be written) together with those of seeds 0 to 999.
 
     Args:

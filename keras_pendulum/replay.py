@@ -14,10 +14,10 @@ class Transitions(NamedTuple):
     Arrays from the buffer, tensors inside the update.
     """
 
-    observation: Any  # [..., 3] float32
-    action: Any  # [...] int32, the index of the torque
+    observation: Any  # [..., D] float32
+    action: Any  # [...] int32, the action's index
     reward: Any  # [...] float32
-    next_observation: Any  # [..., 3] float32
+    next_observation: Any  # [..., D] float32
     terminated: Any  # [...] bool, true where no value follows; truncation is not termination
 
 

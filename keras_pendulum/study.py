@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="python -m keras_pendulum.study",
         description="Train variants of the agent with many seeds, and tell with intervals how good "
         "each becomes. Without --presets and --arm: from `original` to `reference` one change at a "
-        "time, and `reference` without each change.",
+        "time, `reference` without each change, and with index-truncation.",
         epilog="Ctrl-C stops; the same command goes on, and so does one with more seeds.",
     )
     parser.add_argument(
