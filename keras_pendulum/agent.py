@@ -199,6 +199,10 @@ class Agent:
         self.update_target(self.online, self.target, self.optimizer.iterations)
         return loss
 
+    def close(self) -> None:
+        """Ends the thread of `begin_update`."""
+        self._thread.shutdown()
+
     def get_state(self) -> tuple[list[NDArray[Any]], dict[str, Arrays]]:
         """The online weights, and target and optimizer as FlatVariables has them; all read-only."""
         state = self._variables.read()

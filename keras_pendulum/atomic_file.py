@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import os
 import uuid
+from collections.abc import Callable
 from pathlib import Path
 
 from keras_pendulum.errors import UserError
 
 
-def write_atomically(path: str | os.PathLike[str], *parts: bytes) -> None:
+def write_atomically(
+    path: str | os.PathLike[str], *parts: bytes, check: Callable[[Path], object] = lambda file: None
+) -> None:
     """Puts the parts at `path`: written beside it, flushed to the disk, and swapped in.
+
+    Args:
+        path: the file.
+        parts: what it is to hold.
+        check: called with the new file before it is swapped in; what it raises comes out.
 
     Raises UserError when the file system refuses; an old file at `path` is then unharmed.
     """
@@ -24,6 +32,7 @@ def write_atomically(path: str | os.PathLike[str], *parts: bytes) -> None:
                 file.writelines(parts)
                 file.flush()
                 os.fsync(file.fileno())
+            check(fresh)
             fresh.replace(target)
         finally:
             fresh.unlink(missing_ok=True)

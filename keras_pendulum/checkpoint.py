@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import fields
 from typing import Any, NamedTuple
@@ -41,10 +42,19 @@ class CheckpointWriter:
 
     The run waits until its state is copied; a thread of its own makes the file. Leaving the `with`
     block waits for the last one.
+
+    Args:
+        path: the file.
+        require_in_place: raises UserError where no file may be put at `path` any more.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        require_in_place: Callable[[], None] = lambda: None,
+    ) -> None:
         self.path = path
+        self._require_in_place = require_in_place
         self._thread = ThreadPoolExecutor(1, "checkpoint")
         self._last: Future[None] | None = None
 
@@ -56,7 +66,7 @@ class CheckpointWriter:
         """
         snapshot = _snapshot(run)
         self._wait()
-        self._last = self._thread.submit(_write, self.path, snapshot)
+        self._last = self._thread.submit(_write, self.path, snapshot, self._require_in_place)
 
     def _wait(self) -> None:
         if self._last is not None:
@@ -94,7 +104,11 @@ def _snapshot(run: Run) -> _Snapshot:
     return _Snapshot(run.agent.online, online, agent, replay, state, list(run.history))
 
 
-def _write(path: str | os.PathLike[str], snapshot: _Snapshot) -> None:
+def _write(
+    path: str | os.PathLike[str],
+    snapshot: _Snapshot,
+    require_in_place: Callable[[], None] = lambda: None,
+) -> None:
     for arrays in snapshot.agent.values():
         require_finite(arrays.values())
     content = weights_file(
@@ -109,7 +123,7 @@ def _write(path: str | os.PathLike[str], snapshot: _Snapshot) -> None:
             "history": _rows(snapshot.history),
         },
     )
-    write_sealed(path, content)
+    write_sealed(path, content, check=lambda file: require_in_place())
 
 
 def load_config(path: str | os.PathLike[str]) -> Config:

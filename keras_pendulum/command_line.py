@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import wraps
 from typing import Any, NoReturn
 
 from keras_pendulum.config import Config
@@ -19,10 +22,11 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Leaves with exit status 2."""
-        self.exit(2, f"error: {message}\n")
+        self.exit(2, f"error: {_one_line(message)}\n")
 
     def parse_args(self, *words: Any) -> Any:  # type: ignore[override]
         """As argparse; where a shell asks for completions, argcomplete answers and leaves."""
+        _mend_output()
         if "_ARGCOMPLETE" in os.environ:
             import argcomplete
 
@@ -61,16 +65,35 @@ class ControlC:
 def run_command(command: Callable[[], int]) -> int:
     """Calls `command`; a user's mistake becomes one line on stderr and exit status 2."""
     try:
-        return command()
+        status = command()
+        sys.stdout.flush()
+        return status
     except UserError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {_one_line(str(error))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:
-        # The reader of our output has gone; Python would complain once more when it flushes.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+    except OSError as error:
+        # Our output's reader has gone, or its disk is full: Python would complain once more when it
+        # flushes.
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            return 1
+        print(f"error: {_one_line(str(error))}", file=sys.stderr)
+        return 2
+
+
+def _mend_output() -> None:
+    """Nothing that is printed ends a command, whatever its output can show or was closed."""
+    if sys.stdout is None:  # closed by whoever started us
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, for the whole process
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
+
+
+def _one_line(message: str) -> str:
+    return " ".join(message.splitlines())
 
 
 def add_config_flags(parser: argparse.ArgumentParser, skip: Sequence[str] = ()) -> None:
@@ -80,7 +103,7 @@ def add_config_flags(parser: argparse.ArgumentParser, skip: Sequence[str] = ()) 
         if spec.name not in skip:
             group.add_argument(
                 f"--{spec.name.replace('_', '-')}",
-                type=_READERS[str(spec.type).removesuffix(" | None")],
+                type=_reader(str(spec.type)),
                 choices=spec.metadata["choices"],
                 default=argparse.SUPPRESS,
                 metavar=None if spec.metadata["choices"] else "N",
@@ -110,14 +133,23 @@ def setting_from_text(field: str, text: str) -> Any:
     spec = Config.__dataclass_fields__.get(field)
     if spec is None:
         raise ConfigError(f"unknown setting {field!r}")
-    kind, _, optional = str(spec.type).partition(" | ")
-    if optional and text == "none":
-        return None
+    read = _reader(str(spec.type))
     try:
-        return _READERS[kind](text)
+        return read(text)
     except ValueError as error:
-        expected = _READERS[kind].__name__
-        raise ConfigError(f"{field} is {text!r}; expected {expected}") from error
+        raise ConfigError(f"{field} is {text!r}; expected {read.__name__}") from error
+
+
+def _reader(kind: str) -> Callable[[str], Any]:
+    """What reads a typed value of a field's type; where there may be none, `none` is that."""
+    plain, _, optional = kind.partition(" | ")
+    read = _READERS[plain]
+
+    @wraps(read)
+    def read_or_none(text: str) -> Any:
+        return None if text == "none" else read(text)
+
+    return read_or_none if optional else read
 
 
 def _whole_numbers(text: str) -> tuple[int, ...]:
@@ -134,4 +166,6 @@ _READERS: dict[str, Callable[[str], Any]] = {
 
 
 def _shown(value: Any) -> str:
+    if value is None:
+        return "none"
     return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import Any
 
 from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.setting import checked, setting
+
+LARGEST_FILE = 2**30  # bytes that a `.h5` may have; a checkpoint of `reference` has 4.5 MB
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,7 @@ class Config:
             value = checked_setting(spec.name, getattr(self, spec.name))
             object.__setattr__(self, spec.name, value)
         self._check_task()
+        self._check_size()
         if self.update_after == "step" and self.learning_rate_schedule == "cosine":
             raise ConfigError(
                 "learning_rate_schedule cosine needs update_after episode or reset: how many "
@@ -206,6 +210,21 @@ class Config:
             raise ConfigError(
                 "remembered_action 'truncated' belongs to the walkthrough's 41 torques, "
                 f"not to torque_count {self.torque_count}"
+            )
+
+    def _check_size(self) -> None:
+        """Raises ConfigError where the run's checkpoint would be too large to be read."""
+        task = TASKS[self.environment]
+        outputs = task.action_count or self.torque_count
+        widths = (task.observation_size, *self.hidden_units, outputs)
+        weights = sum((inputs + 1) * units for inputs, units in pairwise(widths))
+        copies = 4 if self.optimizer == "adam" else 5  # online, target, and the optimizer's moments
+        transition = 8 * task.observation_size + 9  # bytes
+        size = 4 * copies * weights + self.replay_capacity * transition + 64 * self.episodes
+        if size > LARGEST_FILE - 2**20:
+            raise ConfigError(
+                f"hidden_units and replay_capacity make a checkpoint of {size / 2**30:.1f} GiB, "
+                "where less than 1 can be read: make them smaller"
             )
 
     @property

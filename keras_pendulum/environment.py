@@ -25,6 +25,7 @@ class Task:
         int | None
     )  # of Gymnasium's own actions; None where a torque acts, under a gravity
     weights_name: str  # of a run's checkpoint
+    seconds_per_step: float
 
     @property
     def has_torque(self) -> bool:
@@ -35,10 +36,10 @@ class Task:
 TASKS = {
     # Observation [cos θ, sin θ, θ̇ in rad/s], θ = 0 upright; an action [1] is a torque in N·m;
     # reward -(θ² + 0.1 θ̇² + 0.001 u²).
-    "Pendulum-v1": Task(3, STEPS_PER_EPISODE, True, None, "pendulum_weight.h5"),
+    "Pendulum-v1": Task(3, STEPS_PER_EPISODE, True, None, "pendulum_weight.h5", 0.05),
     # Observation [x in m, ẋ in m/s, θ in rad, θ̇ in rad/s], θ = 0 upright; action 0 pushes left, 1
     # right; reward 1 a step until |θ| > 12° or |x| > 2.4 m terminates.
-    "CartPole-v1": Task(4, 500, False, 2, "cartpole_weight.h5"),
+    "CartPole-v1": Task(4, 500, False, 2, "cartpole_weight.h5", 0.02),
 }
 
 

@@ -10,4 +10,4 @@ class ConfigError(UserError, ValueError):
 
 
 class WeightsError(UserError, ValueError):
-    """A weights file that cannot be read or written, or does not hold what it should."""
+    """A weights file that cannot be read, or does not hold what it should."""

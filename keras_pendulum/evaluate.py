@@ -14,6 +14,7 @@ from keras_pendulum.atomic_file import require_no_other_file, write_atomically
 from keras_pendulum.backend import quick_import, require_tensorflow
 from keras_pendulum.command_line import OneLineParser, name, run_command
 from keras_pendulum.display import draw_without_display, require_display
+from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.lost_window import LossGuard
 
@@ -78,7 +79,7 @@ def _evaluate(arguments: argparse.Namespace) -> int:
 
 
 def _film(network: DQN, seed: int, gravity: float | None, path: str) -> None:
-    """Writes a GIF of the first episode, every second frame of it."""
+    """Writes a GIF of the first episode at its own speed, ten frames a second."""
     from keras_pendulum import pictures
     from keras_pendulum.evaluation import evaluate_policy
 
@@ -92,7 +93,8 @@ def _film(network: DQN, seed: int, gravity: float | None, path: str) -> None:
         render_mode="rgb_array",
         on_step=lambda env: frames.append(env.render()),
     )
-    write_atomically(path, pictures.gif(frames[::2], seconds_per_frame=0.1))
+    apart = round(0.1 / TASKS[network.origin.environment].seconds_per_step)
+    write_atomically(path, pictures.gif(frames[::apart], seconds_per_frame=0.1))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -130,8 +131,8 @@ def evaluate_policy(
     def act(observation: NDArray[np.float32]) -> Any:
         return actions.control(policy.action(observation))
 
-    returns = [_episode_return(env, start, act, on_step) for start in seeds]
-    env.close()
+    with contextlib.closing(env):
+        returns = [_episode_return(env, start, act, on_step) for start in seeds]
     best = np.full(episodes, np.nan) if gravity is None else optimal_return(gravity, seeds)
     return Score(environment, gravity, np.array(returns), best)
 

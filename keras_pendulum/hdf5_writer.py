@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 from h5py import h5a, h5d, h5f, h5g, h5p, h5s, h5t
@@ -24,7 +25,8 @@ _WITHOUT_TIMES.set_obj_track_times(False)
 @contextmanager
 def file_in_memory() -> Iterator[h5f.FileID]:
     """A new file that no disk will hold; its bytes come from `image`, inside the `with` block."""
-    file = h5f.create(b"weights", h5f.ACC_TRUNC, fapl=_IN_MEMORY)
+    # A name of its own: HDF5 does not open two files of one name at a time.
+    file = h5f.create(uuid4().bytes.hex().encode(), h5f.ACC_TRUNC, fapl=_IN_MEMORY)
     try:
         yield file
     finally:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.errors import WeightsError
@@ -17,10 +17,10 @@ _MARK = b"\nkeras_pendulum sha256 "
 _SEAL = len(_MARK) + 64  # bytes
 
 
-def write_sealed(path: str | os.PathLike[str], content: bytes) -> None:
-    """Puts the content and its digest at `path`. Raises UserError as `write_atomically` does."""
+def write_sealed(path: str | os.PathLike[str], content: bytes, **options: Any) -> None:
+    """As `write_atomically`, the content with its digest behind it."""
     digest = hashlib.sha256(content).hexdigest()
-    write_atomically(path, content, _MARK + digest.encode())
+    write_atomically(path, content, _MARK + digest.encode(), **options)
 
 
 def verify(file: BinaryIO, path: str | os.PathLike[str]) -> None:

@@ -21,10 +21,10 @@ from h5py import h5f
 from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum import integrity, structure
+from keras_pendulum.config import LARGEST_FILE
 from keras_pendulum.errors import UserError, WeightsError
 from keras_pendulum.hdf5_writer import add_arrays, add_attributes, add_group
 
-_LARGEST_FILE = 2**30  # bytes; a checkpoint of `reference` has 4.5 MB
 _LARGEST_LAYER = 8192  # units
 _Layer = tuple[str, list[Any]]  # its name and its datasets, kernel and bias
 
@@ -45,19 +45,19 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
         if not file.is_file():
             raise WeightsError(f"{path}: not a file; expected a weights file (.h5)")
         with open(file, "rb") as stream:
+            head = stream.read(8)
+            if not head:
+                raise WeightsError(f"{path}: the file is empty; expected a weights file (.h5)")
+            if head != b"\x89HDF\r\n\x1a\n":
+                raise WeightsError(f"{path}: not an HDF5 file; expected a weights file (.h5)")
+            if file.stat().st_size > LARGEST_FILE:
+                raise WeightsError(f"{path}: larger than 1 GiB; no network here is")
+            stream.seek(0)
             integrity.verify(stream, path)
             structure.check_heaps(stream, path)
-            stream.seek(0)
-            head = stream.read(8)
     except OSError as error:
         raise WeightsError(f"{path}: cannot be read ({error.strerror})") from error
     try:
-        if not head:
-            raise WeightsError(f"{path}: the file is empty; expected a weights file (.h5)")
-        if head != b"\x89HDF\r\n\x1a\n":
-            raise WeightsError(f"{path}: not an HDF5 file; expected a weights file (.h5)")
-        if file.stat().st_size > _LARGEST_FILE:
-            raise WeightsError(f"{path}: larger than 1 GiB; no network here is")
         with h5py.File(file, "r") as content:
             structure.check(content, path)
             yield content

@@ -9,6 +9,8 @@ from typing import Any
 
 import keras
 
+_DTYPE = "float32"  # whatever the user's keras.json says
+
 
 @dataclass(frozen=True)
 class Origin:
@@ -40,7 +42,7 @@ class DQN(keras.Model):
         seed: int = 0,
         origin: Origin | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(dtype=_DTYPE)
         self.hidden_units = tuple(hidden_units)
         self.action_count = action_count
         self.observation_size = observation_size
@@ -56,7 +58,11 @@ class DQN(keras.Model):
                 kernel = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
                 bias = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
             return keras.layers.Dense(
-                units, activation, kernel_initializer=kernel, bias_initializer=bias
+                units,
+                activation,
+                kernel_initializer=kernel,
+                bias_initializer=bias,
+                dtype=_DTYPE,
             )
 
         widths = (observation_size, *hidden_units)

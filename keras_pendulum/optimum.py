@@ -25,6 +25,7 @@ and all others are computed when first asked for and kept in the user's cache fo
 
 from __future__ import annotations
 
+import contextlib
 import io
 import itertools
 import logging
@@ -90,10 +91,10 @@ def optimal_return(
     wanted = [_checked_seed(seed) for seed in seeds]
     steps = _checked_steps(steps)
     name = _file_name(gravity, steps)
-    cache = _cache_folder() / name
     known = _read(Path(__file__).with_name("optimal_values") / name, gravity, steps)
     if not known.keys() >= set(wanted):
-        cached = _read(cache, gravity, steps)
+        cache = _cache_file(name)
+        cached = _read(cache, gravity, steps) if cache else {}
         known |= cached
         missing = sorted(set(wanted) - known.keys())
         if missing:
@@ -102,11 +103,10 @@ def optimal_return(
             found = _best_return(gravity, pendulum_starts(missing), steps)
             fresh = dict(zip(missing, found.tolist(), strict=True))
             known |= fresh
-            try:
-                cache.parent.mkdir(parents=True, exist_ok=True)
-                _write(cache, gravity, steps, cached | fresh)
-            except (OSError, UserError):
-                pass  # the cache only saves time
+            with contextlib.suppress(OSError, UserError):  # the cache only saves time
+                if cache:
+                    cache.parent.mkdir(parents=True, exist_ok=True)
+                    _write(cache, gravity, steps, cached | fresh)
     return np.array([known[seed] for seed in wanted], np.float64)
 
 
@@ -154,7 +154,7 @@ def _searched_return(
 def _checked_gravity(gravity: float) -> float:
     try:
         number = float(gravity)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not 0 <= number <= 100:  # written so that NaN fails too
         raise ConfigError(f"gravity is {gravity!r}; expected a number from 0 to 100 (m/s²)")
@@ -175,9 +175,13 @@ def _checked_steps(steps: int) -> int:
     return number
 
 
-def _cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
-    return Path(base) / "keras_pendulum"
+def _cache_file(name: str) -> Path | None:
+    """None for a user who has no home."""
+    try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
+    except RuntimeError:
+        return None
+    return Path(base) / "keras_pendulum" / name
 
 
 def _file_name(gravity: float, steps: int) -> str:

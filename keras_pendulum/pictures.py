@@ -181,11 +181,12 @@ def _png(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
-def gif(frames: Sequence[NDArray[np.uint8]], seconds_per_frame: float, size: int = 250) -> bytes:
-    """An endless GIF of RGB frames [H, W, 3], scaled to `size` pixels a side."""
+def gif(frames: Sequence[NDArray[np.uint8]], seconds_per_frame: float, height: int = 250) -> bytes:
+    """An endless GIF of RGB frames [H, W, 3], scaled to `height` pixels."""
     from PIL import Image
 
-    images: list[Any] = [Image.fromarray(frame).resize((size, size)) for frame in frames]
+    size = (round(frames[0].shape[1] / frames[0].shape[0] * height), height)
+    images: list[Any] = [Image.fromarray(frame).resize(size) for frame in frames]
     stream = io.BytesIO()
     images[0].save(
         stream,

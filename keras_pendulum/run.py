@@ -53,6 +53,11 @@ class Run:
         self.agent = make_agent(config, self.random, initial)
         self.history: list[EpisodeRecord] = []
 
+    def close(self) -> None:
+        """Ends what goes on beside the run: a window, and the thread that learns."""
+        self.env.close()
+        self.agent.close()
+
     def episodes(self) -> Iterator[EpisodeRecord]:
         """Goes on to the end of the run, yielding each episode's record."""
         last = self.history[-1] if self.history else None

@@ -6,8 +6,7 @@ import contextlib
 import json
 import math
 import os
-import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
@@ -27,22 +26,33 @@ class RunFolder:
     Args:
         path: the folder.
         environment: that of the run; None takes it from the checkpoint that lies there.
+
+    Raises UserError when the folder cannot be read, or holds the checkpoints of two environments
+    and none is named.
     """
 
     def __init__(self, path: str | os.PathLike[str], environment: str | None = None) -> None:
         self.path = Path(path)
-        checkpoints = [self.path / task.weights_name for task in TASKS.values()]
-        if environment is not None:
-            self.weights = self.path / TASKS[environment].weights_name
-        else:
+        try:
+            # Else a link that is turned meanwhile would lead a run into another one's folder.
+            self._place = Path(os.path.realpath(path))
+            checkpoints = [self._place / task.weights_name for task in TASKS.values()]
             there = [file for file in checkpoints if file.exists()]
-            # Two lie there where one run was replacing another and was killed: the newer goes on.
-            self.weights = max(there, key=lambda file: file.stat().st_mtime, default=checkpoints[0])
+        except OSError as error:
+            raise UserError(f"cannot read the folder {path}: {error.strerror}") from error
+        if environment is not None:
+            self.weights = self._place / TASKS[environment].weights_name
+        elif len(there) > 1:
+            names = " and ".join(file.name for file in there)
+            raise UserError(f"{path} holds {names}: move one of them to another folder")
+        else:
+            self.weights = (there or checkpoints)[0]
         self._others = [file for file in checkpoints if file != self.weights]
-        self.history = self.path / "history.csv"
-        self.config = self.path / "config.json"
-        self.picture = self.path / "rewards.png"
-        self.events = self.path / "tensorboard"
+        self.history = self._place / "history.csv"
+        self.config = self._place / "config.json"
+        self.picture = self._place / "rewards.png"
+        self.events = self._place / "tensorboard"
+        self.require_in_place: Callable[[], None] = lambda: None  # see folder_lock.held
 
     @property
     def files(self) -> list[Path]:
@@ -52,7 +62,7 @@ class RunFolder:
     def make(self) -> None:
         """Makes the folder, if need be. Raises UserError when it cannot be made."""
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
+            self._place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
 
@@ -62,46 +72,61 @@ class RunFolder:
 
         Raises UserError when another run holds it.
         """
-        if not self.path.is_dir():
+        if not self._place.is_dir():
             yield  # nothing to resume, which the checkpoint's reader tells
             return
-        with held(self.path):
+        with held(self._place) as self.require_in_place:
             yield
 
     def claim(self, overwrite: bool) -> None:
         """Raises UserError when the folder holds a run already and `overwrite` is false."""
         used = [file.name for file in (*self.files, *self._others) if file.exists()]
+        used += [self.events.name] if self._event_files() else []
         if used and not overwrite:
             raise UserError(
                 f"{self.path} already holds a run ({', '.join(used)}): go on with it by --resume, "
                 "replace it by --overwrite, or name another folder by --out"
             )
 
+    def replace_others(self) -> None:
+        """Removes what another run left here, once the checkpoint of a new one is there.
+
+        Raises UserError when it cannot be removed.
+        """
+        _remove(*self._others, *self._event_files())
+
     def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
         """Writes the settings, and the history of the episodes before a resumed run goes on.
 
-        To be called once the run's own checkpoint is there: what was here before of another run
-        or of a killed one goes. Raises UserError when the folder cannot be written.
+        What a killed run was writing goes. Raises UserError when the folder cannot be written.
         """
-        history = list(history)
-        if not history:
-            shutil.rmtree(self.events, ignore_errors=True)
-        for file in (self.picture, *self._others, *self.path.glob(".*.h5.*.tmp")):
-            try:
-                file.unlink(missing_ok=True)
-            except OSError as error:
-                raise UserError(f"cannot replace {file}: {error.strerror}") from error
+        for file in (*self.files, *self._others):
+            _remove(*self._place.glob(f".{file.name}.*.tmp"))
+        _remove(self.picture)
         write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
         lines = [",".join(_COLUMNS), *map(_row, history)]
         write_atomically(self.history, "".join(line + "\n" for line in lines).encode())
 
     def append(self, record: EpisodeRecord) -> None:
-        """Adds a row to the history. Raises UserError when it cannot be written."""
+        """Adds a row to the history. Raises UserError when it, or the folder, is out of reach."""
+        self.require_in_place()
         try:
             with open(self.history, "a", encoding="ascii") as file:
                 file.write(_row(record) + "\n")
         except OSError as error:
             raise UserError(f"cannot write {self.history}: {error.strerror}") from error
+
+    def _event_files(self) -> list[Path]:
+        # By name, because a folder called tensorboard may hold anything.
+        return list(self.events.glob("events.out.tfevents.*"))
+
+
+def _remove(*files: Path) -> None:
+    for file in files:
+        try:
+            file.unlink(missing_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot replace {file}: {error.strerror}") from error
 
 
 def _row(record: EpisodeRecord) -> str:

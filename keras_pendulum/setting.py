@@ -52,9 +52,8 @@ def _checked_number(name: str, kind: type, value: Any, rule: Mapping[str, Any]) 
     if isinstance(value, bool) or not isinstance(value, wanted):
         word = "a number" if kind is float else "a whole number"
         raise ConfigError(f"{name} is {value!r}; expected {word}")
-    number = kind(value)
-    if not rule["low"] <= number <= rule["high"]:  # written so that NaN fails too
+    if not rule["low"] <= value <= rule["high"]:  # written so that NaN fails too
         raise ConfigError(
-            f"{name} is {number}; expected a number from {rule['low']} to {rule['high']}"
+            f"{name} is {value}; expected a number from {rule['low']} to {rule['high']}"
         )
-    return number
+    return kind(value)

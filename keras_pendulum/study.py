@@ -161,7 +161,6 @@ def _make_runs(folder: StudyFolder, engine: Engine) -> list[tuple[Task, str]]:
 
 def _report(folder: StudyFolder, arms: Sequence[Arm]) -> None:
     from keras_pendulum import study_picture, study_table
-    from keras_pendulum.atomic_file import write_atomically
 
     results = folder.results()
     rows = study_table.make_rows(arms, results)
@@ -174,7 +173,7 @@ def _report(folder: StudyFolder, arms: Sequence[Arm]) -> None:
         "figure.png": study_picture.study_figure(rows, results),
     }
     for file, content in files.items():
-        write_atomically(folder.path / file, content)
+        folder.write(file, content)
     print(f"\n{files['table.md'].decode()}\nSaved in {folder.path}: {', '.join(files)}, results/")
 
 

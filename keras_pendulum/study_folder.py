@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -36,9 +37,12 @@ class StudyFolder:
         self.versions = installed_versions()
         self._arms = arms
         self._seeds = seeds
-        self._manifest = path / "study.json"
-        self._log = path / "seconds.csv"
-        self._results = path / "results"
+        # As for a run's folder: a link that is turned meanwhile does not lead astray.
+        self._place = Path(os.path.realpath(path))
+        self._require_in_place: Callable[[], None] = lambda: None
+        self._manifest = self._place / "study.json"
+        self._log = self._place / "seconds.csv"
+        self._results = self._place / "results"
         self._maker: dict[Config, Arm] = {}
         for arm in arms:
             self._maker.setdefault(arm.training, arm)
@@ -50,14 +54,14 @@ class StudyFolder:
         Raises UserError when it holds another study or something else, or cannot be written.
         """
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
+            self._place.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
-        with held(self.path):
+        with held(self._place) as self._require_in_place:
             if self._manifest.exists():
                 self._require_same_study()
             else:
-                if any(not file.name.startswith(".study.json.") for file in self.path.iterdir()):
+                if any(not file.name.startswith(".study.json.") for file in self._place.iterdir()):
                     raise UserError(
                         f"{self.path} holds something else than a study: name another folder by "
                         "--out"
@@ -87,11 +91,12 @@ class StudyFolder:
     def keep(self, task: Task, outcome: Outcome) -> Result:
         """Writes a result atomically, and what it cost to the log.
 
-        Raises UserError when it is damaged or cannot be written.
+        Raises UserError when it is damaged or cannot be written, or the folder was moved.
         """
         result = decode(outcome.result, task)
         if result is None:
             raise UserError(f"{outcome.worker} sent a damaged result of {task.arm}")
+        self._require_in_place()
         write_atomically(self._file(task), outcome.result)
         seconds = (outcome.training, outcome.evaluation, outcome.total)
         line = io.StringIO()
@@ -104,6 +109,10 @@ class StudyFolder:
         except OSError as error:
             raise UserError(f"cannot write {self._log}: {error.strerror}") from error
         return result
+
+    def write(self, name: str, content: bytes) -> None:
+        """Puts what the results tell beside them. Raises UserError when it cannot be written."""
+        write_atomically(self._place / name, content)
 
     def results(self) -> dict[str, list[Result]]:
         """The sound results of each arm by its name, in the order of their seeds."""

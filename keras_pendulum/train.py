@@ -21,7 +21,6 @@ from keras_pendulum.command_line import (
     run_command,
     typed_settings,
 )
-from keras_pendulum.config import Config
 from keras_pendulum.display import require_display
 from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import UserError
@@ -30,7 +29,6 @@ from keras_pendulum.presets import PRESETS, preset
 from keras_pendulum.progress import make_progress
 
 if TYPE_CHECKING:
-    from keras_pendulum.episodes import EpisodeRecord
     from keras_pendulum.live_plot import LivePlot
     from keras_pendulum.run_folder import RunFolder
     from keras_pendulum.training import TrainingResult
@@ -92,7 +90,7 @@ def _train(arguments: argparse.Namespace) -> int:
     log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
     progress = None if arguments.quiet else make_progress(config)
     started = time.perf_counter()
-    with _Interrupt(config) as interrupt:
+    with _Interrupt() as interrupt:
         result = train_dqn(
             config,
             out,
@@ -100,7 +98,7 @@ def _train(arguments: argparse.Namespace) -> int:
             overwrite=arguments.overwrite,
             resume=arguments.resume,
             render=arguments.render,
-            listeners=[each for each in (progress, interrupt.listen, live, log) if each],
+            listeners=[each for each in (progress, live, log) if each],
             on_checkpoint=log.on_checkpoint if log else lambda network, episode: None,
             should_stop=lambda: interrupt.asked,
         )
@@ -108,8 +106,8 @@ def _train(arguments: argparse.Namespace) -> int:
         live.finish()
     if sys.stdout.isatty() and progress and not result.finished:
         print()  # the bar is still on its line
-    _print_summary(result, folder, time.perf_counter() - started)
-    return 0 if result.finished else 130
+    _print_summary(result, folder, time.perf_counter() - started, score=not interrupt.asked)
+    return 130 if interrupt.asked else 0
 
 
 def _live_plot() -> LivePlot | None:
@@ -123,31 +121,30 @@ def _live_plot() -> LivePlot | None:
 
 
 class _Interrupt:
-    """The first Ctrl-C asks the run to stop after its episode; the next one, or one after the
-    last episode, ends the command at once.
+    """The first Ctrl-C asks the run to stop after its episode and to keep what it has learned; the
+    next one ends the command at once.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self) -> None:
         self.asked = False
-        self._last = config.episodes - 1
+        self._before = signal.getsignal(signal.SIGINT)
 
     def __enter__(self) -> _Interrupt:
-        self._before = signal.signal(signal.SIGINT, self._ask)
+        if self._before != signal.SIG_IGN:  # as of a job in the background
+            signal.signal(signal.SIGINT, self._ask)
         return self
 
     def __exit__(self, *problem: object) -> None:
         signal.signal(signal.SIGINT, self._before)
-
-    def listen(self, record: EpisodeRecord) -> None:
-        if record.episode == self._last:
-            signal.signal(signal.SIGINT, self._before)
 
     def _ask(self, signum: int, frame: object) -> None:
         self.asked = True
         signal.signal(signal.SIGINT, self._before)
 
 
-def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) -> None:
+def _print_summary(
+    result: TrainingResult, folder: RunFolder, seconds: float, *, score: bool
+) -> None:
     from keras_pendulum.evaluation import evaluate_policy, random_return
 
     last = result.history[-1]
@@ -156,11 +153,11 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
         f"{state} {last.episode + 1} episodes ({last.environment_steps} steps, {last.updates} "
         f"updates); this took {seconds:.1f} s."
     )
-    if result.finished:
-        score = evaluate_policy(result.network)
-        print(score.summary())
-        steps = TASKS[score.environment].steps_per_episode
-        chance = random_return(score.environment, score.gravity, steps)
+    if score:
+        greedy = evaluate_policy(result.network)
+        print(greedy.summary())
+        steps = TASKS[greedy.environment].steps_per_episode
+        chance = random_return(greedy.environment, greedy.gravity, steps)
         print(f"Uniformly random actions on the same starts: {chance:.2f}")
     saved = ", ".join(file.name for file in folder.files if file.exists())
     print(f"Saved in {folder.path}: {saved}")
@@ -168,7 +165,7 @@ def _print_summary(result: TrainingResult, folder: RunFolder, seconds: float) ->
 
 
 def _what_next(result: TrainingResult, folder: RunFolder) -> str:
-    weights = shlex.quote(str(folder.weights))
+    weights = shlex.quote(str(folder.path / folder.weights.name))
     if not result.finished:
         commands = {"Go on": f"train --resume --out {shlex.quote(str(folder.path))}"}
     elif TASKS[result.network.origin.environment].has_torque:

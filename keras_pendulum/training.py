@@ -59,9 +59,13 @@ def train_dqn(
     Raises:
         ConfigError: settings and `init`, or settings and checkpoint, do not fit.
         WeightsError: the checkpoint to resume from is damaged.
-        UserError: `out` is in use or cannot be written, or a loss, a weight or what the
-            environment gives is not finite; the last checkpoint is then that of a sound run.
+        UserError: `resume` comes with `init` or `overwrite`; `out` is in use, cannot be written or
+            is moved meanwhile; or a loss, a weight or what the environment gives is not finite. The
+            last checkpoint is then that of a sound run.
     """
+    if resume and (init is not None or overwrite):
+        raise UserError("resume goes on with a run; init and overwrite start a new one")
+    listeners = list(listeners)
     folder = None if out is None else RunFolder(out, config.environment)
     with contextlib.ExitStack() as held:
         if resume:
@@ -69,8 +73,10 @@ def train_dqn(
                 raise UserError("resume needs the folder of the run to go on with")
             held.enter_context(folder.held())
             run = load_checkpoint(folder.weights, config, render)
+            held.callback(run.close)
         else:
             run = Run(config, init, render)
+            held.callback(run.close)
             if folder is not None:
                 folder.make()
                 held.enter_context(folder.held())
@@ -78,6 +84,7 @@ def train_dqn(
                 # Before the other files, so that no policy of another run lies beside them, and so
                 # that there is a run to resume from the start.
                 save_checkpoint(run, folder.weights)
+                folder.replace_others()
         if folder is None:
             finished = _learn(run, listeners, should_stop)
         else:
@@ -95,17 +102,23 @@ def _learn_and_keep(
 ) -> bool:
     """As `_learn`, with a checkpoint now and then, and at the end a last one and the picture."""
     config = run.config
-    with CheckpointWriter(folder.weights) as writer:
+    kept = -1  # the last episode of which there is a checkpoint
+    with CheckpointWriter(folder.weights, folder.require_in_place) as writer:
+
+        def save() -> None:
+            nonlocal kept
+            kept = run.history[-1].episode
+            writer.save(run)
+            on_checkpoint(run.agent.online, kept)
 
         def keep(record: EpisodeRecord) -> None:
             folder.append(record)
             if record.episode % config.save_every == 0:
-                writer.save(run)
-                on_checkpoint(run.agent.online, record.episode)
+                save()
 
         finished = _learn(run, [keep, *listeners], should_stop)
-        writer.save(run)
-        on_checkpoint(run.agent.online, run.history[-1].episode)
+        if run.history[-1].episode != kept:
+            save()
     if finished:
         maps = beside_optimum(run.agent.online, config)
         picture = pictures.finished_run(run.history, config.environment, _levels(config), maps)

@@ -44,10 +44,18 @@ def save_weights(
         evaluated_return: the mean return that `evaluate_policy(network)` gave, one more attribute.
 
     Raises:
-        UserError: the file cannot be written, or a weight is not finite.
+        UserError: the file cannot be written, or `load_weights` would not take it.
     """
-    weights = network.get_weights()
-    write_sealed(path, weights_file(network, weights, evaluated_return=evaluated_return))
+    content = weights_file(network, network.get_weights(), evaluated_return=evaluated_return)
+
+    def read_back(file: Path) -> None:
+        try:
+            _read(file)
+        except WeightsError as error:
+            reason = str(error).removeprefix(f"{file}: ")
+            raise UserError(f"cannot write {path}: it could not be loaded, {reason}") from error
+
+    write_sealed(path, content, check=read_back)
 
 
 def weights_file(
@@ -104,12 +112,26 @@ def load_weights(path: str | os.PathLike[str]) -> DQN:
     Raises:
         WeightsError: the file is missing, damaged, or not such a network; says what is wrong.
     """
+    activation, origin, layers = _read(path)
+    widths = [bias.shape[0] for bias in layers[1::2]]
+    network = DQN(
+        widths[:-1],
+        widths[-1],
+        observation_size=TASKS[origin.environment].observation_size,
+        activation=activation,
+        origin=origin,
+    )
+    network.set_weights(layers)
+    return network
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[str, Origin, list[NDArray[np.float32]]]:
+    """The hidden activation of a file's network, where it comes from, and its weights, checked."""
     with layer_files.opened(path) as file:
         activation, origin = _read_origin(file, path)
         task = TASKS[origin.environment]
         layers = layer_files.read_layers(file, path, task.observation_size)
-    kernels = layers[::2]
-    outputs = kernels[-1].shape[1]
+    outputs = layers[-1].shape[0]
     if outputs < 2:
         raise WeightsError(f"{path}: the network has one output; expected one for each action")
     if task.action_count not in (None, outputs):
@@ -117,15 +139,7 @@ def load_weights(path: str | os.PathLike[str]) -> DQN:
             f"{path}: the network has {outputs} outputs; {origin.environment} has "
             f"{task.action_count} actions"
         )
-    network = DQN(
-        [kernel.shape[1] for kernel in kernels[:-1]],
-        outputs,
-        observation_size=task.observation_size,
-        activation=activation,
-        origin=origin,
-    )
-    network.set_weights(layers)
-    return network
+    return activation, origin, layers
 
 
 def _read_origin(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Origin]:

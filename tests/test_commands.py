@@ -17,13 +17,14 @@ from pathlib import Path
 import pandas
 import pytest
 import tensorflow as tf
-from conftest import DATA, Command, Refusal, command_line
+from conftest import DATA, Command, Refusal, command_line, without_gpu_note
 from PIL import Image, ImageSequence
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import keras_pendulum as kp
 from keras_pendulum import evaluate, train
-from keras_pendulum.episodes import EpisodeRecord
+from keras_pendulum.checkpoint import CheckpointWriter, load_checkpoint
+from keras_pendulum.run import Run
 
 RECORDED = DATA / "pendulum_weight.keras2.h5"
 
@@ -203,7 +204,7 @@ def test_tensorboard_gets_curves_and_maps(here: Command, tmp_path: Path) -> None
     assert tf.io.decode_png(maps[51][2]).shape == (650, 900, 4)
     done = here("train", *words[:-1], "--episodes", "2", "--overwrite")
     assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "run" / "tensorboard").exists()  # no curves of another run
+    assert not list((tmp_path / "run" / "tensorboard").iterdir())  # no curves of another run
 
 
 def test_a_missing_tensorboard_is_told(
@@ -273,6 +274,16 @@ def test_evaluate_films_the_first_episode(command: Command, tmp_path: Path) -> N
         assert len(list(ImageSequence.Iterator(film))) > 50  # Pillow joins frames that are alike
     assert done.stderr == ""
     assert (tmp_path / "film.gif").stat().st_size < 500_000
+
+
+def test_a_film_has_the_shape_and_the_speed_of_what_is_filmed(
+    here: Command, tmp_path: Path
+) -> None:
+    assert here("evaluate", "cartpole", "--episodes", "1", "--gif", "film.gif").returncode == 0
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.size == (375, 250)
+        shown = sum(frame.info["duration"] for frame in ImageSequence.Iterator(film))
+    assert shown == pytest.approx(500 * 20, rel=0.03)  # ms
 
 
 def test_evaluate_shows_the_episodes_with_a_dummy_display(command: Command) -> None:
@@ -357,19 +368,89 @@ def test_the_librarys_names_are_all_there() -> None:
 
 
 def test_the_first_control_c_asks_to_stop_and_the_second_ends_the_command() -> None:
-    with train._Interrupt(kp.preset("original")) as interrupt:
+    with train._Interrupt() as interrupt:
         signal.raise_signal(signal.SIGINT)
         assert interrupt.asked
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
 
 
-def test_control_c_after_the_last_episode_ends_the_command_at_once() -> None:
-    rows = (EpisodeRecord(i, -1.0, -200.0, 0.5, 0.0, 200, 0, 0.1) for i in (0, 1))
-    with train._Interrupt(kp.preset("original", episodes=2)) as interrupt:
-        interrupt.listen(next(rows))
-        assert signal.getsignal(signal.SIGINT) == interrupt._ask
-        interrupt.listen(next(rows))
-        with pytest.raises(KeyboardInterrupt):
+def test_a_control_c_that_is_ignored_as_in_the_background_stays_so() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with train._Interrupt() as interrupt:
             signal.raise_signal(signal.SIGINT)
         assert not interrupt.asked
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_control_c_after_the_last_episode_keeps_the_whole_run_and_skips_the_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save = CheckpointWriter.save
+
+    def interrupted(writer: CheckpointWriter, run: Run) -> None:
+        if len(run.history) == 5:
+            signal.raise_signal(signal.SIGINT)
+        save(writer, run)
+
+    monkeypatch.setattr(CheckpointWriter, "save", interrupted)
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "5", "--quiet"]
+    assert train.main([*words, "--out", str(tmp_path)]) == 130
+    shown = capsys.readouterr().out
+    assert "Trained 5 episodes" in shown
+    assert "Greedy" not in shown
+    config = kp.preset("original", hidden_units=(8,), episodes=5)
+    assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 5
+    assert (tmp_path / "rewards.png").exists()
+
+
+def test_a_terminal_that_lacks_our_characters_shows_others(tmp_path: Path) -> None:
+    main, terminal = pty.openpty()
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
+    environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
+    for more in (words, ["--help"]):
+        done = subprocess.run(
+            command_line("train", *more),
+            cwd=tmp_path,
+            env=environment,
+            stdout=terminal,
+            stderr=subprocess.PIPE,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr
+        assert b"?" in os.read(main, 2**16)
+    os.close(main)
+    os.close(terminal)
+
+
+def redirected(to: str, *words: str, folder: Path) -> tuple[int, str]:
+    """Exit status and stderr of a command that the shell starts with its output redirected."""
+    done = subprocess.run(
+        ["sh", "-c", f'exec "$@" {to}', "sh", *command_line(*words)],
+        cwd=folder,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return done.returncode, without_gpu_note(done.stderr)
+
+
+def test_a_closed_output_stops_nothing(tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
+    assert redirected(">&-", "train", *words, folder=tmp_path) == (0, "")
+    assert (tmp_path / "run" / "rewards.png").exists()
+
+
+def test_an_output_without_room_is_told_in_one_line(tmp_path: Path) -> None:
+    told = redirected(">/dev/full", "evaluate", "original", folder=tmp_path)
+    assert told == (2, "error: [Errno 28] No space left on device\n")
+
+
+def test_a_typed_line_break_does_not_break_the_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        train.main(["--foo\nbar"])
+    assert evaluate.main(["some\nfile"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 2

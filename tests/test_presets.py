@@ -99,6 +99,19 @@ def test_a_value_that_no_run_can_have_is_named(name: str, value: Any) -> None:
         kp.preset("reference", **{name: value})
 
 
+def test_a_checkpoint_that_could_not_be_read_is_refused_before_the_run() -> None:
+    with pytest.raises(kp.ConfigError, match=r"make a checkpoint of 1\.0 GiB, where less than 1"):
+        kp.preset("reference", hidden_units=(8192, 8192))
+    with pytest.raises(kp.ConfigError, match=r"make a checkpoint of 1\.2 GiB"):
+        kp.preset("cartpole-original", hidden_units=(8000, 7000), replay_capacity=4_000_000)
+    assert kp.preset("reference", hidden_units=(8192, 6000)).hidden_units == (8192, 6000)
+
+
+def test_a_number_beyond_all_floats_is_refused_too() -> None:
+    with pytest.raises(kp.ConfigError, match=r"^learning_rate is 1000"):
+        kp.preset("reference", learning_rate=10**400)
+
+
 def test_a_batch_larger_than_the_buffer_is_refused() -> None:
     with pytest.raises(kp.ConfigError, match="batch_size 64 is larger than the 50 transitions"):
         kp.preset("reference", batch_size=64, replay_capacity=50)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import os
+import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,7 @@ from keras_pendulum.checkpoint import (
     load_checkpoint,
     save_checkpoint,
 )
+from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.run_folder import RunFolder
 
 
@@ -56,9 +59,9 @@ def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(
     config = kp.preset("original", episodes=24, hidden_units=(8,))
     contents: list[bytes] = []
 
-    def write(path: Path, *parts: bytes) -> None:
+    def write(path: Path, *parts: bytes, **options: Any) -> None:
         contents.append(b"".join(parts))
-        write_atomically(path, *parts)
+        write_atomically(path, *parts, **options)
 
     monkeypatch.setattr("keras_pendulum.integrity.write_atomically", write)
     kp.train_dqn(config, tmp_path / "run")
@@ -157,19 +160,115 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path, monkeypatch: pytest.Monk
 def test_what_a_killed_run_left_half_written_goes(tmp_path: Path) -> None:
     config = kp.preset("original", episodes=2, hidden_units=(8,))
     kp.train_dqn(config, tmp_path)
-    (tmp_path / ".pendulum_weight.h5.0123456789abcdef.tmp").touch()
+    for name in ("pendulum_weight.h5", "cartpole_weight.h5", "history.csv", "rewards.png"):
+        (tmp_path / f".{name}.0123456789abcdef.tmp").touch()
     (tmp_path / "mine.tmp").touch()
     kp.train_dqn(config, tmp_path, resume=True)
     assert [file.name for file in tmp_path.glob("*.tmp")] == ["mine.tmp"]
 
 
-def test_of_two_checkpoints_the_newer_one_goes_on(tmp_path: Path) -> None:
-    for name, age in (("pendulum_weight.h5", 10), ("cartpole_weight.h5", 20)):
-        (tmp_path / name).touch()
-        os.utime(tmp_path / name, (age, age))
-    assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
-    os.utime(tmp_path / "pendulum_weight.h5", (30, 30))
-    assert RunFolder(tmp_path).weights.name == "pendulum_weight.h5"
+def test_of_two_checkpoints_none_goes_on_unless_it_is_named_and_both_stay(tmp_path: Path) -> None:
+    pendulum = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(pendulum, tmp_path)
+    kp.train_dqn(kp.preset("cartpole-original", episodes=2), tmp_path / "other")
+    policy = (tmp_path / "other" / "cartpole_weight.h5").rename(tmp_path / "cartpole_weight.h5")
+    content = policy.read_bytes()
+    with pytest.raises(kp.UserError, match=r"holds pendulum_weight\.h5 and cartpole_weight\.h5"):
+        RunFolder(tmp_path)
+    kp.train_dqn(replace(pendulum, episodes=3), tmp_path, resume=True)
+    assert policy.read_bytes() == content
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_folder_that_happens_to_be_called_tensorboard_is_nobodys_to_empty(
+    overwrite: bool, tmp_path: Path
+) -> None:
+    (tmp_path / "tensorboard").mkdir()
+    (tmp_path / "tensorboard" / "my_best.h5").write_bytes(b"a policy")
+    config = kp.preset("original", episodes=1, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path, overwrite=overwrite)
+    assert (tmp_path / "tensorboard" / "my_best.h5").read_bytes() == b"a policy"
+
+
+def test_curves_alone_are_a_run_too(tmp_path: Path) -> None:
+    (tmp_path / "tensorboard").mkdir()
+    (tmp_path / "tensorboard" / "events.out.tfevents.1.host").touch()
+    with pytest.raises(kp.UserError, match=r"already holds a run \(tensorboard\)"):
+        kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
+
+
+def test_a_link_turned_meanwhile_does_not_lead_a_run_into_another_folder(tmp_path: Path) -> None:
+    best, new, latest = (tmp_path / name for name in ("best", "new", "latest"))
+    config = kp.preset("original", episodes=12, hidden_units=(8,))
+    kp.train_dqn(replace(config, seed=7), best)
+    before = {file: file.read_bytes() for file in best.iterdir()}
+    new.mkdir()
+    latest.symlink_to(new)
+
+    def turn(record: EpisodeRecord) -> None:
+        if record.episode == 5:
+            latest.unlink()
+            latest.symlink_to(best)
+
+    kp.train_dqn(config, latest, listeners=[turn])
+    assert {file: file.read_bytes() for file in best.iterdir()} == before
+    assert len(load_checkpoint(new / "pendulum_weight.h5", config).history) == 12
+
+
+@pytest.mark.parametrize("writing", ["a checkpoint", "its history"])
+def test_a_run_whose_folder_is_moved_ends_and_leaves_what_is_there_now(
+    writing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, moved = tmp_path / "run", tmp_path / "moved"
+    config = kp.preset("original", episodes=12, hidden_units=(8,))
+    before: dict[Path, bytes] = {}
+    written, go_on = threading.Event(), threading.Event()
+    first, fsync = iter([True]), os.fsync
+
+    def wait_in_the_writers_thread(file: int) -> None:
+        fsync(file)
+        if threading.current_thread() is not threading.main_thread() and next(first, False):
+            written.set()
+            assert writing != "a checkpoint" or go_on.wait(60)
+
+    def move(record: EpisodeRecord) -> None:
+        if record.episode == (0 if writing == "a checkpoint" else 5):
+            assert written.wait(60)
+            folder.rename(moved)
+            kp.train_dqn(replace(config, seed=7), folder)
+            before.update({file: file.read_bytes() for file in folder.iterdir()})
+            go_on.set()
+
+    monkeypatch.setattr("keras_pendulum.atomic_file.os.fsync", wait_in_the_writers_thread)
+    with pytest.raises(kp.UserError, match="run was moved, removed or replaced"):
+        kp.train_dqn(config, folder, listeners=[move])
+    assert len(before) == 4
+    assert {file: file.read_bytes() for file in folder.iterdir()} == before
+    assert load_checkpoint(moved / "pendulum_weight.h5", config).config == config
+
+
+def test_a_folder_that_cannot_be_read_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(kp.UserError, match=r"cannot read the folder a.*File name too long"):
+        RunFolder("a" * 300)
+
+    def refuse(*arguments: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("keras_pendulum.folder_lock.os.open", refuse)
+    with pytest.raises(kp.UserError, match=r"cannot read the folder .*Permission denied"):
+        kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
+
+
+def test_a_policy_can_be_kept_while_a_checkpoint_is_written(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=30, hidden_units=(8,), save_every=1)
+    kp.train_dqn(
+        config,
+        tmp_path,
+        on_checkpoint=lambda network, episode: kp.save_weights(network, tmp_path / f"{episode}.h5"),
+    )
+    assert len(list(tmp_path.glob("*[0-9].h5"))) == 30
 
 
 @pytest.mark.parametrize(

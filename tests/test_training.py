@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import keras
 import numpy as np
 import pytest
 from conftest import assert_same, comparable
@@ -31,6 +32,43 @@ SHORT: dict[str, Any] = {"episodes": 46}  # learning begins at episode 41
 def test_the_same_seed_twice_is_the_same_run_bit_for_bit(name: str) -> None:
     config = kp.preset(name, **SHORT)
     assert_same(kp.train_dqn(config), kp.train_dqn(config))
+
+
+@pytest.mark.parametrize("name", ["reference", "cartpole-original"])
+def test_a_user_whose_keras_computes_in_float64_gets_the_same_run(name: str) -> None:
+    config = kp.preset(name, hidden_units=(8,), **SHORT)
+    whole = kp.train_dqn(config)
+    keras.config.set_floatx("float64")
+    keras.config.set_dtype_policy("float64")
+    try:
+        assert_same(kp.train_dqn(config), whole)
+    finally:
+        keras.config.set_floatx("float32")
+        keras.config.set_dtype_policy("float32")
+
+
+def test_listeners_that_come_one_by_one_are_all_told_all() -> None:
+    told: list[object] = []
+    config = kp.preset("original", hidden_units=(8,), episodes=3)
+    kp.train_dqn(config, listeners=(told.append for _ in range(2)))
+    assert len(told) == 6
+
+
+def test_the_network_is_told_once_of_each_checkpoint(tmp_path: Path) -> None:
+    told: list[int] = []
+    config = kp.preset("original", hidden_units=(8,), episodes=21)
+    kp.train_dqn(config, tmp_path, on_checkpoint=lambda network, episode: told.append(episode))
+    assert told == [0, 10, 20]
+
+
+@pytest.mark.parametrize("more", [{"init": kp.DQN((8,))}, {"overwrite": True}])
+def test_a_resumed_run_takes_neither_other_weights_nor_another_runs_place(
+    more: dict[str, Any], tmp_path: Path
+) -> None:
+    config = kp.preset("original", hidden_units=(8,), episodes=1)
+    kp.train_dqn(config, tmp_path)
+    with pytest.raises(kp.UserError, match="init and overwrite start a new one"):
+        kp.train_dqn(config, tmp_path, resume=True, **more)
 
 
 @pytest.mark.parametrize("first", ["the update", "the episode"])

@@ -14,13 +14,20 @@ import pytest
 from conftest import DATA
 
 import keras_pendulum as kp
+from keras_pendulum.integrity import write_sealed
 from keras_pendulum.network import Origin
+from keras_pendulum.weights import weights_file
 
 OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
 
 
 def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
     return kp.DQN(hidden, actions, seed=3, origin=Origin("Pendulum-v1", 2.5, "reference", 7))
+
+
+def unchecked(network: kp.DQN, path: Path) -> None:
+    """Saves what `save_weights` would refuse."""
+    write_sealed(path, weights_file(network, network.get_weights()))
 
 
 def dense_layers(keras_module: Any, hidden: tuple[int, ...], actions: int) -> list[Any]:
@@ -241,8 +248,8 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "no layers": (lambda path: h5py.File(path, "w").close(), "holds no network weights"),
     "other data": (changed(lambda f: f.attrs.__delitem__("layer_names")), "no network weights"),
     "convolution": (other_model, "expected a kernel"),
-    "cartpole": (lambda path: kp.save_weights(kp.DQN((8,), 2, observation_size=4), path), "4 inp"),
-    "one output": (lambda path: kp.save_weights(kp.DQN((8,), 1), path), "one output"),
+    "cartpole": (lambda path: unchecked(kp.DQN((8,), 2, observation_size=4), path), "4 inp"),
+    "one output": (lambda path: unchecked(kp.DQN((8,), 1), path), "one output"),
     "wrong width": (
         changed(replace_array("dense_1/dense_1/kernel:0", np.zeros((17, 8), "f4"))),
         "takes 17 inputs; expected 16",
@@ -305,6 +312,31 @@ def test_a_bad_file_is_refused_in_one_line_that_names_it(kind: str, tmp_path: Pa
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     assert (path.read_bytes() if path.is_file() else None) == before
+
+
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        (lambda: kp.DQN((8,), 1), "the network has one output"),
+        (lambda: kp.DQN((8193,), 2), "has 8193 units; expected 1 to 8192"),
+        (lambda: kp.DQN((8,), activation="elu"), "records the activation 'elu'"),
+        (lambda: kp.DQN((8,), observation_size=4), "takes 4 inputs; expected 3"),
+        (lambda: kp.DQN((8,), origin=Origin(gravity=1000.0)), "the recorded gravity is 1000"),
+        (lambda: kp.DQN((8,), origin=Origin("Acrobot-v1")), "belongs to 'Acrobot-v1'"),
+        (lambda: kp.DQN((1,) * 400), "more than 1000"),
+    ],
+)
+def test_what_could_not_be_loaded_is_not_saved(
+    made: Callable[[], kp.DQN], reason: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.h5"
+    kp.save_weights(network(), path)
+    with pytest.raises(kp.UserError) as caught:
+        kp.save_weights(made(), path)
+    assert str(caught.value).startswith(f"cannot write {path}: it could not be loaded, ")
+    assert reason in str(caught.value)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
+    assert_same_values(kp.load_weights(path), network())
 
 
 def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
