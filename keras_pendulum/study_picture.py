@@ -45,8 +45,8 @@ def study_figure(rows: Sequence[Row], results: Mapping[str, Sequence[Result]]) -
     """
     from matplotlib.figure import Figure
 
-    drawn = [row for row in rows if row.arm.curve][: len(STYLES)]
-    styles = {row.arm.name: style for row, style in zip(drawn, STYLES, strict=False)}
+    drawn = [row for row in rows if row.arm.curve]
+    styles = {row.arm.name: _style(place) for place, row in enumerate(drawn)}
     tasks = list(dict.fromkeys(row.arm.task for row in drawn))
     height = max(6.5, 1.5 + 0.55 * len(rows), 4.0 * len(tasks))
     figure = Figure(figsize=(13, height), layout="constrained")
@@ -58,6 +58,14 @@ def study_figure(rows: Sequence[Row], results: Mapping[str, Sequence[Result]]) -
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=100)
     return stream.getvalue()
+
+
+def _style(place: int) -> _Style:
+    """Each curve's own; where colours come again, they do so with another line and marker."""
+    color, _, _ = STYLES[place % len(STYLES)]
+    # By three, as each colour then gets a line that looks different from the one it had.
+    _, line, marker = STYLES[(place + place // len(STYLES) * 3) % len(STYLES)]
+    return color, line, marker
 
 
 def _draw_regrets(axes: Axes, rows: Sequence[Row], styles: Mapping[str, _Style]) -> None:
@@ -127,7 +135,8 @@ def _draw_curves(
     # Below, where it covers no curve.
     axes.legend(
         loc="upper center",
-        bbox_to_anchor=(0.5, -0.11),
+        bbox_to_anchor=(0.5, 0),
+        borderaxespad=4,  # in letters, however high the panel is: below the axis and its name
         ncols=1,
         fontsize="small",
         frameon=False,

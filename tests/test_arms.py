@@ -37,7 +37,7 @@ def test_each_change_is_left_out_of_reference_and_equal_arms_share_their_runs() 
     assert len({arm.slug for arm in arms}) == len(arms)
 
 
-def test_each_arm_that_shall_have_a_curve_finds_a_style_for_it() -> None:
+def test_each_curve_of_the_default_study_has_a_colour_of_its_own() -> None:
     assert len([arm for arm in default_arms() if arm.curve]) <= len(STYLES)
 
 
