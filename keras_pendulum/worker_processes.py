@@ -13,6 +13,7 @@ import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -42,6 +43,8 @@ class WorkerProcesses(Executor):
     """
 
     def __init__(self, count: int) -> None:
+        # Started by a lane, it would let SIGINT through there again.
+        resource_tracker.ensure_running()
         self._calls: queue.SimpleQueue[tuple[Future[Any], _Call] | None] = queue.SimpleQueue()
         self._lanes = [_Lane(self._calls) for _ in range(count)]
 
@@ -81,6 +84,9 @@ class _Lane(threading.Thread):
         self.start()
 
     def run(self) -> None:
+        # A terminal sends Ctrl-C to the workers too, but the study's own process answers it. They
+        # start with this thread's mask, so that it does not find them while they still import.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         while (item := self._calls.get()) is not None:
             future, call = item
             if not future.set_running_or_notify_cancel():
@@ -133,7 +139,6 @@ def _ending(code: int | None) -> str:
 
 def _serve(pipe: Connection) -> None:
     """What a worker process does: one call after the other, until nobody asks any more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the study's own process answers Ctrl-C
     keep_to_one_thread()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 import signal
 import subprocess
@@ -58,10 +59,14 @@ def wait_for(what: Callable[[], object]) -> None:
 
 
 @contextmanager
-def started(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
+def started(*words: str | Path, own_group: bool = False) -> Iterator[subprocess.Popen[str]]:
     """A process that is not left behind."""
     with subprocess.Popen(
-        [str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        [str(word) for word in words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=own_group,
     ) as process:
         try:
             yield process
@@ -84,6 +89,14 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert "seeds per core-hour" in done.stdout
     assert result_files(folder).items() >= before.items()
     return folder
+
+
+def workers_of(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    return [
+        child
+        for child in psutil.Process(process.pid).children()
+        if "spawn_main" in " ".join(child.cmdline())
+    ]
 
 
 def test_a_study_killed_in_mid_run_goes_on_and_repeats_nothing(finished: Path) -> None:
@@ -128,11 +141,7 @@ def test_a_killed_worker_costs_its_own_run_alone(finished: Path, tmp_path: Path)
     words = command_line("study", *ARMS, "--seeds", "2", "--workers", "1", "--out", str(folder))
     with started(*words) as process:
         wait_for(lambda: result_files(folder))
-        (worker,) = [
-            child
-            for child in psutil.Process(process.pid).children()
-            if "spawn_main" in " ".join(child.cmdline())
-        ]
+        (worker,) = workers_of(process)
         worker.kill()
         output, _ = process.communicate(timeout=120)
     assert process.returncode == 0, output
@@ -140,19 +149,21 @@ def test_a_killed_worker_costs_its_own_run_alone(finished: Path, tmp_path: Path)
     assert result_files(folder) == result_files(finished)
 
 
-def test_control_c_stops_at_once_and_says_how_to_go_on(tmp_path: Path) -> None:
+@pytest.mark.parametrize("seconds", [0, 0.05, 0.15])
+def test_control_c_stops_at_once_and_says_how_to_go_on(seconds: float, tmp_path: Path) -> None:
     folder = tmp_path / "study"
-    words = ["--arm", "long: reference episodes=100000", "--seeds", "2", "--out", str(folder)]
-    with started(*command_line("study", *words, "--workers", "1")) as process:
-        wait_for(lambda: (folder / "seconds.csv").exists())
+    words = ["--arm", "long: reference episodes=100000", "--seeds", "8", "--out", str(folder)]
+    with started(*command_line("study", *words, "--workers", "8"), own_group=True) as process:
+        wait_for(lambda: workers_of(process))
+        time.sleep(seconds)  # so far the first worker comes with its imports
         children = psutil.Process(process.pid).children(recursive=True)
-        process.send_signal(signal.SIGINT)
-        output = without_gpu_note(process.communicate(timeout=60)[0])  # if the worker came so far
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
+        output = without_gpu_note(process.communicate(timeout=60)[0])  # if a worker came so far
         psutil.wait_procs(children, 60)
         assert not [child for child in children if child.is_running()]
     assert process.returncode == 130
     assert output.endswith(
-        f"0 of 2 runs are in {folder}; the same command goes on with the others\n"
+        f"0 of 8 runs are in {folder}; the same command goes on with the others\n"
     )
     assert output.count("\n") == 1
 
