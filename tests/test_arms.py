@@ -41,6 +41,14 @@ def test_each_curve_of_the_default_study_has_a_colour_of_its_own() -> None:
     assert len([arm for arm in default_arms() if arm.curve]) <= len(STYLES)
 
 
+def test_arms_that_differ_only_in_how_often_they_save_share_their_runs() -> None:
+    one, two, three = own_arms(
+        ["reference"], ["seldom: reference save_every=7", "less: reference discount=0.5"]
+    )
+    assert one.config != two.config
+    assert one.training == two.training != three.training
+
+
 def test_an_own_arm_is_a_preset_with_settings() -> None:
     one, two, three = own_arms(
         ["reference", "cartpole"], ["small: reference hidden_units=8,4 gravity=1 discount=0.5"]

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -18,13 +19,21 @@ import psutil
 import pytest
 from conftest import Command, command_line, without_gpu_note
 
-from keras_pendulum import study
+import keras_pendulum as kp
+from keras_pendulum import study, study_run
 from keras_pendulum.arms import own_arms
 from keras_pendulum.errors import UserError
 from keras_pendulum.presets import preset
 from keras_pendulum.study_folder import StudyFolder
-from keras_pendulum.study_result import Task, installed_versions
-from keras_pendulum.study_run import train_and_score
+from keras_pendulum.study_result import (
+    Result,
+    Task,
+    decode,
+    encode,
+    installed_versions,
+    thinned,
+)
+from keras_pendulum.study_run import Outcome, train_and_score
 
 # Learning starts with episode 41: these make updates too.
 ARMS = [
@@ -120,6 +129,33 @@ def test_the_table_comes_as_markdown_json_and_csv_with_a_figure(finished: Path) 
     assert float(table[1]["regret_iqm"]) == rows[1]["regret_iqm"]
     assert (finished / "table.md").read_text().count("\n| s") == 2
     assert (finished / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_run_is_what_the_library_trains_with_that_seed(finished: Path) -> None:
+    first, second = (
+        json.loads((finished / f"results/small/small-seed{seed}.json").read_bytes())["result"]
+        for seed in (0, 1)
+    )
+    trained = kp.train_dqn(preset("reference", hidden_units=(8,), episodes=43, seed=1))
+    assert second["returns"] == kp.evaluate_policy(trained.network).returns.tolist()
+    learnt = [record.episode_return for record in trained.history]
+    assert second["episode_returns"] == thinned(learnt)
+    assert first["returns"] != second["returns"]
+    assert first["episode_returns"] != second["episode_returns"]
+
+
+def test_cartpoles_regret_is_what_lacks_to_500_and_a_run_asks_for_one_thread(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked = []
+    monkeypatch.setattr(study_run, "keep_to_one_thread", lambda: asked.append("one thread"))
+    config = preset("cartpole", hidden_units=(8,), episodes=1)
+    task = Task("pole", "pole", config, installed_versions())
+    result = decode(train_and_score(task).result, task)
+    assert result is not None
+    assert result.best_mean_return == 500
+    assert 0 < result.regret == 500 - sum(result.returns) / 100 < 500
+    assert asked == ["one thread"]
 
 
 def test_a_damaged_result_is_made_again_as_it_was(finished: Path, command: Command) -> None:
@@ -263,6 +299,67 @@ def test_other_versions_elsewhere_are_told(finished: Path, tmp_path: Path) -> No
     assert not folder.missing()
     folder.versions = {**folder.versions, "keras": "2.0"}
     assert len(folder.missing()) == 4  # results of other versions are not taken for this study's
+
+
+def outcome(task: Task) -> Outcome:
+    """A run that was made without learning."""
+    return Outcome(encode(task, Result(0.0, [-1.5], [-0.1], [-1.5])), 1.0, 2.0, 4.0, "there:7")
+
+
+def test_runs_that_fail_are_told_and_the_same_command_tries_them_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def diverge(task: Task) -> Outcome:
+        if (task.arm, task.config.seed) == ("starved", 0):
+            raise UserError("the loss is nan")
+        return outcome(task)
+
+    monkeypatch.setattr("keras_pendulum.worker_processes.WorkerProcesses", ThreadPoolExecutor)
+    monkeypatch.setattr(study_run, "train_and_score", diverge)
+    words = [*ARMS, "--seeds", "2", "--workers", "1", "--out", str(tmp_path / "study")]
+    assert study.main(words) == 1
+    printed = capsys.readouterr()
+    assert printed.err == (
+        "starved, seed 0: failed, the loss is nan\n"
+        "error: 1 of 4 runs failed (starved, seed 0: the loss is nan); the same command tries them "
+        "again\n"
+    )
+    assert re.findall(r"^(.*): regret 1\.50, 4\.0 s, (\d/\d)", printed.out, re.M) == [
+        ("small, seed 0", "1/4"),
+        ("small, seed 1", "2/4"),
+        ("starved, seed 1", "3/4"),
+    ]
+
+    monkeypatch.setattr(study_run, "train_and_score", outcome)
+    assert study.main(words) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert printed.out.startswith("3 of 4 runs are there already\nstarved, seed 0: regret 1.50, ")
+    assert ", 4/4, 0:00 left\n" in printed.out
+
+
+def test_a_result_that_came_damaged_is_refused_and_a_sound_ones_cost_is_noted(
+    tmp_path: Path,
+) -> None:
+    folder = StudyFolder(tmp_path / "study", own_arms(["reference"], []), 2)
+    with folder.opened():
+        one, two = folder.tasks()
+        for data in (outcome(one).result[:-9], outcome(two).result):  # cut, and of another run
+            with pytest.raises(UserError, match="there:7 sent a damaged result of reference"):
+                folder.keep(one, outcome(one)._replace(result=data))
+        assert not result_files(folder.path)
+        folder.keep(two, outcome(two))
+        assert folder.missing() == [one]
+    with open(folder.path / "seconds.csv", newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row == {
+        "arm": "reference",
+        "seed": "1",
+        "worker": "there:7",
+        "training": "1.000",
+        "evaluation": "2.000",
+        "total": "4.000",
+    }
 
 
 def test_a_worker_of_another_version_makes_no_run() -> None:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from keras_pendulum import study_loop
 from keras_pendulum.errors import UserError
 from keras_pendulum.presets import preset
 from keras_pendulum.study_loop import Engine, run_all
@@ -63,6 +68,20 @@ def test_ending_the_workers_does_not_wait_for_their_calls() -> None:
     assert queued.cancelled()
 
 
+def test_a_worker_at_work_ends_with_the_process_that_asked_it() -> None:
+    call = "import time\nprint('begun', flush=True)\ntime.sleep(100)"
+    code = (
+        "from keras_pendulum.worker_processes import WorkerProcesses\n"
+        f"WorkerProcesses(1).submit(exec, {call!r}).result()"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"begun\n"
+        process.kill()
+        # Its output, which the worker shares, is not at an end before both are.
+        assert process.communicate(timeout=50)[0] == b""
+
+
 def task(seed: int) -> Task:
     return Task("arm", "arm", preset("reference", seed=seed), {})
 
@@ -92,11 +111,44 @@ def test_a_run_that_dies_is_made_up_to_three_times_and_the_others_go_on() -> Non
     assert ended[2].problem == "OSError: gone"
 
 
-def test_a_users_mistake_is_not_tried_again() -> None:
-    work = Flaky(UserError("the loss is nan"), {0: 99})
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [(UserError("the loss is nan"), "the loss is nan"), (OSError("gone"), "OSError: gone")],
+)
+def test_a_users_mistake_is_not_tried_again_nor_what_the_engine_holds_hopeless(
+    error: Exception, told: str
+) -> None:
+    work = Flaky(error, {0: 99})
     with ThreadPoolExecutor(1) as executor:
-        (ended,) = run_all(Engine(executor, 2, lambda: 1), work, [task(0)])
-    assert (work.made, ended.outcome, ended.problem) == ([0], None, "the loss is nan")
+        (ended,) = run_all(Engine(executor, 2, lambda: 1, hopeless=(OSError,)), work, [task(0)])
+    assert (work.made, ended.outcome, ended.problem) == ([0], None, told)
+
+
+def test_a_run_that_fails_because_the_engine_has_gone_is_not_tried_again() -> None:
+    work = Flaky(OSError("gone"), {0: 99})
+    with ThreadPoolExecutor(1) as executor:
+        engine = Engine(executor, 2, lambda: 1, partial(fail, UserError("no engine")))
+        with pytest.raises(UserError, match="no engine"):
+            list(run_all(engine, work, [task(0)]))
+    assert work.made == [0]
+
+
+def test_an_engine_that_has_gone_is_noticed_while_no_run_ends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(study_loop, "_PATIENCE", 0.01)
+    noticed = threading.Event()
+
+    def require() -> None:
+        noticed.set()
+        raise UserError("no engine")
+
+    def work(task: Task) -> Outcome:
+        noticed.wait(20)
+        return Flaky(OSError(), {})(task)
+
+    with ThreadPoolExecutor(1) as executor, pytest.raises(UserError, match="no engine"):
+        list(run_all(Engine(executor, 1, lambda: 1, require), work, [task(0)]))
 
 
 def test_runs_are_handed_out_a_few_at_a_time() -> None:
