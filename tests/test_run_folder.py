@@ -222,24 +222,24 @@ def test_a_run_whose_folder_is_moved_ends_and_leaves_what_is_there_now(
     folder, moved = tmp_path / "run", tmp_path / "moved"
     config = kp.preset("original", episodes=12, hidden_units=(8,))
     before: dict[Path, bytes] = {}
-    written, go_on = threading.Event(), threading.Event()
-    first, fsync = iter([True]), os.fsync
+    begun, go_on = threading.Event(), threading.Event()
+    first = iter([True])
 
-    def wait_in_the_writers_thread(file: int) -> None:
-        fsync(file)
+    def write(path: Path, *parts: bytes, **options: Any) -> None:
         if threading.current_thread() is not threading.main_thread() and next(first, False):
-            written.set()
+            begun.set()
             assert writing != "a checkpoint" or go_on.wait(60)
+        write_atomically(path, *parts, **options)
 
     def move(record: EpisodeRecord) -> None:
         if record.episode == (0 if writing == "a checkpoint" else 5):
-            assert written.wait(60)
+            assert begun.wait(60)
             folder.rename(moved)
             kp.train_dqn(replace(config, seed=7), folder)
             before.update({file: file.read_bytes() for file in folder.iterdir()})
             go_on.set()
 
-    monkeypatch.setattr("keras_pendulum.atomic_file.os.fsync", wait_in_the_writers_thread)
+    monkeypatch.setattr("keras_pendulum.integrity.write_atomically", write)
     with pytest.raises(kp.UserError, match="run was moved, removed or replaced"):
         kp.train_dqn(config, folder, listeners=[move])
     assert len(before) == 4

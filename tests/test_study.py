@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -360,6 +361,24 @@ def test_a_result_that_came_damaged_is_refused_and_a_sound_ones_cost_is_noted(
         "evaluation": "2.000",
         "total": "4.000",
     }
+
+
+def test_no_result_goes_into_a_folder_that_took_the_studys_place(tmp_path: Path) -> None:
+    place, link = tmp_path / "study", tmp_path / "link"
+    place.mkdir()
+    link.symlink_to(place)
+    folder = StudyFolder(link, own_arms(["reference"], []), 2)
+    with folder.opened():
+        one, two = folder.tasks()
+        link.unlink()
+        link.symlink_to(tmp_path)
+        folder.keep(one, outcome(one))
+        assert len(result_files(place)) == 1
+        place.rename(tmp_path / "moved")
+        shutil.copytree(tmp_path / "moved", place)
+        with pytest.raises(UserError, match="study was moved, removed or replaced"):
+            folder.keep(two, outcome(two))
+    assert len(result_files(place)) == 1
 
 
 def test_a_worker_of_another_version_makes_no_run() -> None:
