@@ -127,11 +127,10 @@ class _Interrupt:
 
     def __init__(self) -> None:
         self.asked = False
-        self._before = signal.getsignal(signal.SIGINT)
 
     def __enter__(self) -> _Interrupt:
-        if self._before != signal.SIG_IGN:  # as of a job in the background
-            signal.signal(signal.SIGINT, self._ask)
+        # Also where it was ignored: `kill -INT` then stops a run in the background.
+        self._before = signal.signal(signal.SIGINT, self._ask)
         return self
 
     def __exit__(self, *problem: object) -> None:

@@ -375,12 +375,13 @@ def test_the_first_control_c_asks_to_stop_and_the_second_ends_the_command() -> N
             signal.raise_signal(signal.SIGINT)
 
 
-def test_a_control_c_that_is_ignored_as_in_the_background_stays_so() -> None:
+def test_a_run_in_the_background_can_be_asked_to_stop_too() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with train._Interrupt() as interrupt:
             signal.raise_signal(signal.SIGINT)
-        assert not interrupt.asked
+        assert interrupt.asked
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
 
