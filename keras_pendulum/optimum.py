@@ -26,28 +26,23 @@ and all others are computed when first asked for and kept in the user's cache fo
 from __future__ import annotations
 
 import contextlib
-import io
 import itertools
 import logging
 import math
 import operator
-import os
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.command_line import OneLineParser, run_command
 from keras_pendulum.environment import STEPS_PER_EPISODE, pendulum_starts
 from keras_pendulum.errors import ConfigError, UserError
-from keras_pendulum.torque import MAX_TORQUE
+from keras_pendulum.known_returns import cache_file, file_name, read, shipped_file, write
 from keras_pendulum.value_tables import (
     FINE_CELLS,
-    MAX_SPEED,
     greedy_return,
     solve,
     try_torques,
@@ -63,7 +58,6 @@ SEARCHED_STEPS = 3  # a fourth gains next to nothing
 GREATEST_SEED = 2**32 - 1
 SHIPPED_SEEDS = range(10_000)
 USUAL_SEEDS = range(1000)
-LOWEST_REWARD = -(math.pi**2 + 0.1 * MAX_SPEED**2 + 0.001 * MAX_TORQUE**2)
 
 
 def optimal_return(
@@ -90,11 +84,10 @@ def optimal_return(
     gravity = _checked_gravity(gravity)
     wanted = [_checked_seed(seed) for seed in seeds]
     steps = _checked_steps(steps)
-    name = _file_name(gravity, steps)
-    known = _read(Path(__file__).with_name("optimal_values") / name, gravity, steps)
+    known = read(shipped_file(gravity, steps), gravity, steps)
     if not known.keys() >= set(wanted):
-        cache = _cache_file(name)
-        cached = _read(cache, gravity, steps) if cache else {}
+        cache = cache_file(gravity, steps)
+        cached = read(cache, gravity, steps) if cache else {}
         known |= cached
         missing = sorted(set(wanted) - known.keys())
         if missing:
@@ -106,7 +99,7 @@ def optimal_return(
             with contextlib.suppress(OSError, UserError):  # the cache only saves time
                 if cache:
                     cache.parent.mkdir(parents=True, exist_ok=True)
-                    _write(cache, gravity, steps, cached | fresh)
+                    write(cache, gravity, steps, cached | fresh)
     return np.array([known[seed] for seed in wanted], np.float64)
 
 
@@ -175,54 +168,6 @@ def _checked_steps(steps: int) -> int:
     return number
 
 
-def _cache_file(name: str) -> Path | None:
-    """None for a user who has no home."""
-    try:
-        base = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
-    except RuntimeError:
-        return None
-    return Path(base) / "keras_pendulum" / name
-
-
-def _file_name(gravity: float, steps: int) -> str:
-    shorter = "" if steps == STEPS_PER_EPISODE else f"_steps_{steps}"
-    return f"gravity_{str(gravity).removesuffix('.0')}{shorter}.npz"
-
-
-def _write(path: Path, gravity: float, steps: int, returns: dict[int, float]) -> None:
-    buffer = io.BytesIO()
-    seeds = sorted(returns)
-    shorter: dict[str, Any] = {} if steps == STEPS_PER_EPISODE else {"steps": np.int64(steps)}
-    np.savez_compressed(
-        buffer,
-        gravity=np.float64(gravity),
-        seeds=np.array(seeds, np.int64),
-        returns=np.array([returns[seed] for seed in seeds], np.float64),
-        **shorter,
-    )
-    write_atomically(path, buffer.getvalue())
-
-
-def _read(path: Path, gravity: float, steps: int) -> dict[int, float]:
-    """What `_write` wrote, or nothing where that is missing, damaged or of other episodes."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            found, seeds, returns = file["gravity"], file["seeds"], file["returns"]
-            found_steps = file.get("steps", STEPS_PER_EPISODE)
-    except Exception:  # one flipped bit of an archive can raise any of seven kinds
-        return {}
-    sound = (
-        (found.shape, found.dtype, seeds.dtype) == ((), np.float64, np.int64)
-        and returns.dtype == np.float64
-        and found == gravity
-        and np.array_equal(found_steps, steps)
-        and seeds.ndim == 1
-        and seeds.shape == returns.shape
-        and bool(((returns >= steps * LOWEST_REWARD) & (returns <= 0)).all())
-    )
-    return dict(zip(seeds.tolist(), returns.tolist(), strict=True)) if sound else {}
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Computes the returns for some gravities and writes the files that ship with the package."""
     parser = OneLineParser(prog="python -m keras_pendulum.optimum", description=main.__doc__)
@@ -236,8 +181,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     starts = pendulum_starts(SHIPPED_SEEDS)
     for gravity in map(_checked_gravity, options.gravity):
         returns = _best_return(gravity, starts, steps).tolist()
-        path = options.out / _file_name(gravity, steps)
-        _write(path, gravity, steps, dict(zip(SHIPPED_SEEDS, returns, strict=True)))
+        path = options.out / file_name(gravity, steps)
+        write(path, gravity, steps, dict(zip(SHIPPED_SEEDS, returns, strict=True)))
         print(f"{path}: mean {np.mean(returns):.4f}")
     return 0
 

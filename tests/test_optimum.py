@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum import optimum
+from keras_pendulum import known_returns, optimum
 from keras_pendulum.command_line import run_command
 from keras_pendulum.optimum import optimal_return
 from keras_pendulum.value_tables import greedy_return, solve, value_tables
@@ -355,13 +355,13 @@ def test_cache_of_other_steps_is_computed_anew(
 def test_no_flipped_bit_is_read_as_another_return(steps: int, tmp_path: Path) -> None:
     path = tmp_path / "gravity_9.81.npz"
     returns = {seed: -seed / 7 for seed in range(10)}
-    optimum._write(path, 9.81, steps, returns)
+    known_returns.write(path, 9.81, steps, returns)
     sound = path.read_bytes()
     for position in range(len(sound)):
         data = bytearray(sound)
         data[position] ^= 0x01
         path.write_bytes(data)
-        assert optimum._read(path, 9.81, steps) in ({}, returns)
+        assert known_returns.read(path, 9.81, steps) in ({}, returns)
 
 
 def test_unwritable_cache_folder_is_no_error(
@@ -382,8 +382,8 @@ def test_command_writes_the_files_that_ship(
     assert optimum.main(["1", "9.81", "--out", str(tmp_path)]) == 0
     assert optimum.main(["9.81", "--steps", "60", "--out", str(tmp_path)]) == 0
     for gravity, steps in ((1.0, 200), (9.81, 200), (9.81, 60)):
-        path = tmp_path / optimum._file_name(gravity, steps)
-        found = optimum._read(path, gravity, steps)
+        path = tmp_path / known_returns.file_name(gravity, steps)
+        found = known_returns.read(path, gravity, steps)
         assert list(found) == list(range(10_000))
         assert max(found.values()) == pytest.approx(-gravity - 1 / steps, abs=0.003)
     assert run_command(lambda: optimum.main(["-3", "--out", str(tmp_path)])) == 2
