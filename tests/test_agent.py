@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,6 +75,37 @@ def test_it_acts_on_the_old_weights_until_an_update_that_it_began_is_finished(
     ours, theirs = (each.agent.policy().q_values(OBSERVATION) for each in (run, twin))
     np.testing.assert_array_equal(ours, theirs)
     assert (ours != acting.q_values(OBSERVATION)).any()
+
+
+def test_a_fresh_agent_too_acts_on_the_old_weights_until_its_first_update_is_finished(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("TF_NUM_INTEROP_THREADS", raising=False)  # else no thread would learn
+    run, batches = small_run()
+    before = GreedyPolicy(run.agent.online).q_values(OBSERVATION)
+
+    def submit(call: Callable[[], Any]) -> Future[Any]:
+        """As if the thread were done before anybody acts."""
+        done: Future[Any] = Future()
+        done.set_result(call())
+        return done
+
+    monkeypatch.setattr(run.agent._thread, "submit", submit)
+    finish = run.agent.begin_update(batches)
+    assert (GreedyPolicy(run.agent.online).q_values(OBSERVATION) != before).any()
+    np.testing.assert_array_equal(run.agent.policy().q_values(OBSERVATION), before)
+    finish()
+    assert (run.agent.policy().q_values(OBSERVATION) != before).any()
+
+
+def test_it_acts_on_the_weights_that_it_is_set_to() -> None:
+    run, batches = small_run()
+    values = run.agent.policy().q_values(OBSERVATION)
+    state = run.agent.get_state()
+    run.agent.update(batches)
+    assert (run.agent.policy().q_values(OBSERVATION) != values).any()
+    run.agent.set_state(*state)
+    np.testing.assert_array_equal(run.agent.policy().q_values(OBSERVATION), values)
 
 
 def test_what_fails_in_an_update_that_it_began_is_raised_where_it_is_finished(

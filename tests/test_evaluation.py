@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -55,6 +56,20 @@ def test_gravity_is_the_networks_own_else_1() -> None:
     assert kp.evaluate_policy(heavy, 1).gravity == 10
     assert kp.evaluate_policy(heavy, 1, gravity=1).gravity == 1
     assert kp.evaluate_policy(heavy, 1).returns != kp.evaluate_policy(heavy, 1, gravity=1).returns
+
+
+def test_the_environment_is_closed_also_when_the_one_who_watches_has_enough(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    closed: list[Any] = []
+
+    def watch(env: gymnasium.Env[Any, Any]) -> None:
+        monkeypatch.setattr(env, "close", lambda: closed.append(env))
+        raise kp.UserError("enough")
+
+    with pytest.raises(kp.UserError, match="enough"):
+        kp.evaluate_policy(kp.DQN((8,)), 1, on_step=watch)
+    assert len(closed) == 1
 
 
 def test_the_best_possible_returns_are_those_of_the_same_starts_and_gravity() -> None:

@@ -59,6 +59,15 @@ def test_a_restored_buffer_goes_on_like_the_saved_one(count: int) -> None:
         np.testing.assert_array_equal(ours, theirs)
 
 
+@pytest.mark.parametrize("added", [-3, 2, 4])
+def test_a_number_of_transitions_other_than_the_stored_ones_is_refused(added: int) -> None:
+    state = filled(4, 3).get_state()
+    replay = filled(4, 1)
+    with pytest.raises(ValueError, match=f"of {added} transitions has shape"):
+        replay.set_state(state, added)
+    assert replay.added == 1
+
+
 def test_what_was_taken_back_is_as_if_it_never_came() -> None:
     replay, plain = ReplayBuffer(4, spare=3), filled(4, 9)
     for count in (9, 12):  # 9, 10 and 11 come, and go

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import threading
 from collections.abc import Callable
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from keras_pendulum.checkpoint import (
     load_config,
     save_checkpoint,
 )
+from keras_pendulum.config import Config
 from keras_pendulum.run import Run
 
 
@@ -48,9 +51,11 @@ def test_a_stopped_and_resumed_run_ends_like_one_never_stopped(name: str, tmp_pa
             should_stop=should_stop,
         )
         assert not stopped.finished
+        assert not (tmp_path / "parts" / "rewards.png").exists()
         assert stopped.history[-1].updates == whole.history[last].updates
     resumed = kp.train_dqn(config, tmp_path / "parts", resume=True)
     assert resumed.finished
+    assert (tmp_path / "parts" / "rewards.png").exists()
     assert_same(resumed, whole)
     rows = [
         (tmp_path / part / "history.csv").read_text().splitlines() for part in ("whole", "parts")
@@ -121,11 +126,72 @@ def test_a_longer_run_of_an_annealed_rate_anneals_over_its_new_length(tmp_path: 
     )
 
 
-def test_resuming_with_other_settings_names_the_one_that_differs(tmp_path: Path) -> None:
-    kp.train_dqn(kp.preset("original", episodes=2, hidden_units=(8,)), tmp_path)
-    other = kp.preset("original", episodes=2, hidden_units=(8,), gravity=3.0)
-    with pytest.raises(kp.ConfigError, match=r"this run has gravity 1\.0, not 3\.0"):
-        kp.train_dqn(other, tmp_path, resume=True)
+@pytest.fixture(scope="module")
+def run_of_one_episode(tmp_path_factory: pytest.TempPathFactory) -> tuple[Config, Path]:
+    config = kp.preset("original", episodes=1, hidden_units=(8,))
+    folder = tmp_path_factory.mktemp("run")
+    kp.train_dqn(config, folder)
+    return config, folder
+
+
+OTHER: dict[str, Any] = {
+    "preset": "mine",
+    "environment": "CartPole-v1",
+    "gravity": 3.0,
+    "episode_steps": 199,
+    "seed": 1,
+    "hidden_units": (9,),
+    "activation": "relu",
+    "initial_weights": "fan-in",
+    "torque_count": 5,
+    "replay_capacity": 7999,
+    "batch_size": 31,
+    "discount": 0.8,
+    "reward_scale": 0.5,
+    "bootstrap": "double",
+    "loss": "huber",
+    "epsilon_schedule": "steps",
+    "epsilon_start": 0.8,
+    "epsilon_decay": 0.98,
+    "epsilon_decay_steps": 999.0,
+    "epsilon_min": 0.02,
+    "update_after": "reset",
+    "learning_starts": 39,
+    "updates_per_episode": 2,
+    "optimizer": "adamw",
+    "optimizer_epsilon": 1e-8,
+    "weight_decay": 0.01,
+    "gradient_clip": 100.0,
+    "learning_rate": 2e-3,
+    "learning_rate_schedule": "cosine",
+    "target_update": "soft",
+    "target_blend": 0.2,
+    "target_period": 199,
+    "remembered_action": "truncated",
+}
+
+
+@pytest.mark.parametrize(
+    "name", [spec.name for spec in fields(Config) if spec.name not in ("episodes", "save_every")]
+)
+def test_resuming_with_another_setting_names_it(
+    name: str, run_of_one_episode: tuple[Config, Path]
+) -> None:
+    config, folder = run_of_one_episode
+    changes = {name: OTHER[name]}
+    if name == "environment":
+        changes["gravity"] = None  # CartPole has none
+    told = f"this run has {name} {getattr(config, name)}, not {OTHER[name]}: "
+    with pytest.raises(kp.ConfigError, match=re.escape(told)):
+        load_checkpoint(folder / "pendulum_weight.h5", replace(config, **changes))
+
+
+def test_a_run_can_be_resumed_to_be_saved_at_other_times(
+    run_of_one_episode: tuple[Config, Path],
+) -> None:
+    config, folder = run_of_one_episode
+    other = replace(config, save_every=3)
+    assert load_checkpoint(folder / "pendulum_weight.h5", other).config == other
 
 
 def replaced(file: h5py.File, name: str, array: Any) -> None:

@@ -61,6 +61,26 @@ def test_the_network_is_told_once_of_each_checkpoint(tmp_path: Path) -> None:
     assert told == [0, 10, 20]
 
 
+def test_windows_and_threads_end_with_their_run_however_it_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended: list[str] = []
+    monkeypatch.setattr(TimeLimit, "close", lambda self: ended.append("environment"))
+    monkeypatch.setattr(Agent, "close", lambda self: ended.append("thread"))
+
+    def fail(record: object) -> None:
+        raise ZeroDivisionError
+
+    config, longer = (kp.preset("original", hidden_units=(8,), episodes=n) for n in (1, 2))
+    kp.train_dqn(config, tmp_path)
+    assert ended == ["environment", "thread"]
+    for again in ({"overwrite": True}, {"resume": True}):
+        ended.clear()
+        with pytest.raises(ZeroDivisionError):
+            kp.train_dqn(longer, tmp_path, listeners=[fail], **again)  # type: ignore[arg-type]
+        assert ended == ["environment", "thread"]
+
+
 @pytest.mark.parametrize("more", [{"init": kp.DQN((8,))}, {"overwrite": True}])
 def test_a_resumed_run_takes_neither_other_weights_nor_another_runs_place(
     more: dict[str, Any], tmp_path: Path
