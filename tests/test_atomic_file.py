@@ -57,6 +57,17 @@ def test_a_limit_on_the_files_size_is_told_and_the_old_file_stays(tmp_path: Path
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == {"a.h5": b"old"}
 
 
+def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    file, link = tmp_path / "elsewhere" / "a.h5", tmp_path / "link.h5"
+    file.write_bytes(b"old")
+    link.symlink_to("elsewhere/a.h5")
+    write_atomically(link, b"new")
+    assert link.readlink() == Path("elsewhere/a.h5")
+    assert file.read_bytes() == b"new"
+    assert [left.name for left in file.parent.iterdir()] == ["a.h5"]
+
+
 def test_a_vanished_folder_is_told(tmp_path: Path) -> None:
     with pytest.raises(kp.UserError, match=r"cannot write .*: No such file or directory"):
         write_atomically(tmp_path / "gone" / "a.h5", b"new")

@@ -36,6 +36,11 @@ def chunked(file: h5py.File, name: str) -> None:
     file.create_dataset(name, (2**14, 2**14), "f4", chunks=(2**11, 2**11), compression="gzip")
 
 
+def one_chunk(file: h5py.File, name: str) -> None:
+    """All that it declares is there, yet an array in chunks need not be stored whole."""
+    file.create_dataset(name, data=np.zeros((3, 16), np.float32), chunks=(3, 16))
+
+
 def texts(file: h5py.File, name: str) -> None:
     file.create_dataset(name, data=["a"] * 4, dtype=h5py.string_dtype())
 
@@ -107,6 +112,7 @@ HOSTILE: dict[str, tuple[Change, str]] = {
     "external storage": (instead(external), "not a plain array"),
     "virtual": (instead(virtual), "not a plain array"),
     "compressed bomb": (instead(chunked), "not a plain array"),
+    "in chunks": (instead(one_chunk), "not a plain array"),
     "declared but not stored": (instead(unwritten), "not a plain array"),
     "texts": (instead(texts), "not a plain array"),
     "references": (instead(reference), "not a plain array"),
@@ -173,6 +179,24 @@ def test_a_large_file_with_texts_of_no_fixed_length_is_refused(
         kp.load_weights(tmp_path / "a.weights.h5")
     kp.save_weights(kp.DQN((16, 8), 5), tmp_path / "ours.h5")
     kp.load_weights(tmp_path / "ours.h5")
+
+
+def test_a_file_larger_than_any_network_is_refused_unread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.h5"
+    kp.save_weights(kp.DQN((16, 8), 5), path)
+    size = path.stat().st_size
+    monkeypatch.setattr("keras_pendulum.layer_files.LARGEST_FILE", size)
+    kp.load_weights(path)
+    monkeypatch.setattr("keras_pendulum.layer_files.LARGEST_FILE", size - 1)
+
+    def read(*parts: object) -> None:
+        raise AssertionError("the file was read")
+
+    monkeypatch.setattr("keras_pendulum.integrity.verify", read)
+    with pytest.raises(kp.WeightsError, match="larger than 1 GiB"):
+        kp.load_weights(path)
 
 
 def test_random_damage_neither_crashes_nor_hangs_nor_gets_in_half() -> None:

@@ -22,7 +22,8 @@ OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
 
 
 def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
-    return kp.DQN(hidden, actions, seed=3, origin=Origin("Pendulum-v1", 2.5, "reference", 7))
+    origin = Origin("Pendulum-v1", 2.5, "reference", 7, '{"seed": 7}')
+    return kp.DQN(hidden, actions, seed=3, origin=origin)
 
 
 def unchecked(network: kp.DQN, path: Path) -> None:
