@@ -286,6 +286,17 @@ def test_a_film_has_the_shape_and_the_speed_of_what_is_filmed(
     assert shown == pytest.approx(500 * 20, rel=0.03)  # ms
 
 
+def test_the_film_is_of_the_start_and_the_gravity_that_are_evaluated(
+    here: Command, tmp_path: Path
+) -> None:
+    films = set()
+    for words in ([], ["--seed", "3"], ["--gravity", "10"]):
+        done = here("evaluate", RECORDED, "--episodes", "1", "--gif", "film.gif", *words)
+        assert done.returncode == 0
+        films.add((tmp_path / "film.gif").read_bytes())
+    assert len(films) == 3
+
+
 def test_evaluate_shows_the_episodes_with_a_dummy_display(command: Command) -> None:
     done = command(
         "evaluate",

@@ -38,6 +38,19 @@ def test_the_window_shows_the_curve_and_what_is_added_to_it(window: live_plot.Li
     pygame.display.quit()
 
 
+def test_at_the_end_it_shows_what_came_after_the_last_drawing(
+    window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window(record(0))
+    before = shown()
+    monkeypatch.setattr(live_plot, "_SECONDS_BETWEEN", 1e9)
+    window(record(1))
+    assert (shown() == before).all()
+    window.finish()
+    assert (shown() != before).any()
+    pygame.display.quit()
+
+
 def test_a_closed_window_stays_closed_and_the_run_goes_on(window: live_plot.LivePlot) -> None:
     window(record(0))
     pygame.event.post(pygame.event.Event(pygame.QUIT))

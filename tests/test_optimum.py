@@ -376,6 +376,21 @@ def test_unwritable_cache_folder_is_no_error(
     assert computed == [1000, 1000]
 
 
+def test_a_user_without_a_home_gets_the_returns_too(
+    computed: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_home(path: Path) -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    known = optimal_return(1.0, range(5))
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "expanduser", no_home)
+    np.testing.assert_array_equal(optimal_return(1.0, range(5)), known)
+    first, second = (optimal_return(9.81, range(5)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert computed == [1000, 1000]  # there is no place to keep them
+
+
 def test_command_writes_the_files_that_ship(
     tmp_path: Path, computed: list[int], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -180,6 +180,10 @@ def test_the_switch_takes_over_and_the_torque_stays_until_another_is_chosen(
     best = player.run("return pendulum.page.episode.network.torques[pendulum.state().best]")
     player.press("s")
     assert player.state()["torque"] == best
+    player.press("t")  # who takes over again starts from no torque
+    assert player.button(0).get_attribute("aria-pressed") == "true"
+    player.press("s")
+    assert player.state()["torque"] == 0
 
 
 def test_a_finger_on_a_torque_takes_over_at_once(pages: dict[str, str], player: Player) -> None:

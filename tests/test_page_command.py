@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from conftest import DATA, Command, Refusal
 
+import keras_pendulum as kp
 from keras_pendulum import page
 
 RECORDED = DATA / "pendulum_weight.keras2.h5"
@@ -30,6 +31,19 @@ def test_the_command_writes_one_small_file_and_says_how_to_open_it(
     text = out.read_text(encoding="utf-8")
     assert '"gravity": 10.0, "trainedGravity": 1.0' in text
     assert not re.search(r'(src|href)="', text)
+
+
+@pytest.mark.parametrize(
+    ("evaluated", "told"),
+    [(-1.5, "-1.5"), (None, "null"), (float("nan"), "null"), (float("-inf"), "null")],
+)
+def test_the_page_tells_the_recorded_return_where_it_is_a_number(
+    evaluated: float | None, told: str, tmp_path: Path
+) -> None:
+    network = kp.DQN((8,))
+    kp.save_weights(network, tmp_path / "a.h5", evaluated)
+    text = page.page_of(network, tmp_path / "a.h5").decode()
+    assert f'"evaluatedReturn": {told},' in text
 
 
 WRONG = [

@@ -193,6 +193,14 @@ def test_the_window_shows_what_happens(no_window: None) -> None:
         assert moved == (band[0] > 0)
 
 
+def test_a_strip_along_the_lower_edge_grows_with_the_episode(no_window: None) -> None:
+    player = played({1: pygame.K_l, 101: pygame.K_j, 201: pygame.K_ESCAPE})
+    row = cockpit._TOP + cockpit._SIDE - 2
+    strips = [(look[:, row] == cockpit._LINE).all(axis=-1) for look in player.looks.values()]
+    assert [int(strip.sum()) for strip in strips] == [0, 300, 600]
+    assert strips[1][:300].all()
+
+
 @pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 40.0])
 def test_a_torque_that_no_pendulum_takes_never_reaches_it(torque: float) -> None:
     class Untouchable:
