@@ -101,7 +101,7 @@ class ReplayBuffer:
         """
         stored = min(added, self.capacity)
         for name, array in self._arrays._asdict().items():
-            if state[name].shape != (stored, *array.shape[1:]) or added < 0:
+            if state[name].shape != (stored, *array.shape[1:]):
                 raise ValueError(f"{name} of {added} transitions has shape {state[name].shape}")
         self._added = added
         slots = (added - stored + np.arange(stored)) % self._slots

@@ -442,6 +442,8 @@ def redirected(to: str, *words: str, folder: Path) -> tuple[int, str]:
     done = subprocess.run(
         ["sh", "-c", f'exec "$@" {to}', "sh", *command_line(*words)],
         cwd=folder,
+        # Unbuffered, nothing would be left to fail at the end.
+        env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
         stderr=subprocess.PIPE,
         text=True,
         timeout=120,
