@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum import layer_files
 from keras_pendulum.config import Config
+from keras_pendulum.environment import TASKS
 from keras_pendulum.episodes import EpisodeRecord
 from keras_pendulum.errors import ConfigError, WeightsError
 from keras_pendulum.flat_variables import Arrays
@@ -160,11 +161,13 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
                 f"{path}: this run has {len(rows)} episodes behind it; episodes {config.episodes} "
                 "cannot be its end"
             )
-        run = Run(config, render=render)
-        online = layer_files.read_layers(file, path, run.agent.online.observation_size)
+        online = layer_files.read_layers(file, path, TASKS[stored.environment].observation_size)
         agent = {name: _arrays(file, name, path) for name in ("target", "optimizer")}
+        replay = _arrays(file, "replay", path)
+    run = Run(config, render=render)
+    with layer_files.damage_told(path):
         run.agent.set_state(online, agent)
-        run.replay.set_state(_arrays(file, "replay", path), state["replay_added"])
+        run.replay.set_state(replay, state["replay_added"])
         run.random.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]
         run.history = [_record(row) for row in rows]

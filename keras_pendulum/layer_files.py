@@ -57,10 +57,16 @@ def opened(path: str | os.PathLike[str]) -> Iterator[h5py.File]:
             structure.check_heaps(stream, path)
     except OSError as error:
         raise WeightsError(f"{path}: cannot be read ({error.strerror})") from error
+    with damage_told(path), h5py.File(file, "r") as content:
+        structure.check(content, path)
+        yield content
+
+
+@contextlib.contextmanager
+def damage_told(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Raises WeightsError where what is read of a file, or made of that, turns out to be wrong."""
     try:
-        with h5py.File(file, "r") as content:
-            structure.check(content, path)
-            yield content
+        yield
     except UserError:
         raise
     # Damage shows as whatever h5py's C library or the first use of a wrong value meets.

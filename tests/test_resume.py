@@ -298,3 +298,17 @@ def test_what_is_not_finite_is_not_saved(part: str, tmp_path: Path) -> None:
     with pytest.raises(kp.UserError, match="a weight is not finite"):
         save_checkpoint(run, tmp_path / "a.h5")
     assert (tmp_path / "a.h5").read_bytes() == before
+
+
+def test_a_window_that_does_not_open_is_not_blamed_on_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=1, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+
+    def no_window(*settings: object) -> None:
+        raise RuntimeError("no window")
+
+    monkeypatch.setattr("keras_pendulum.run.make_environment", no_window)
+    with pytest.raises(RuntimeError, match=r"^no window$"):
+        load_checkpoint(tmp_path / "pendulum_weight.h5", config)
