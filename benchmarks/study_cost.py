@@ -58,17 +58,17 @@ def measured(workers: int, runs: int, episodes: int) -> Row:
         engine = Engine(executor, workers, lambda: workers)
         first = StudyFolder(Path(out) / "warm", [warm], workers)
         started = time.perf_counter()
-        outcomes = [ended.outcome for ended in run_all(engine, train_and_score, first.tasks())]
+        outcomes = [ended.outcome for ended in run_all(engine, train_and_score, first.jobs())]
         useful = sum(each.training + each.evaluation for each in outcomes if each)
         start = time.perf_counter() - started - useful / workers
         folder = StudyFolder(Path(out) / "study", [arm], runs)
         training = evaluation = inside = 0.0
         with folder.opened():
             begun = time.perf_counter()
-            for task, outcome, problem in run_all(engine, train_and_score, folder.missing()):
+            for job, outcome, problem in run_all(engine, train_and_score, folder.missing()):
                 if outcome is None:
                     raise RuntimeError(problem)
-                folder.keep(task, outcome)
+                folder.keep(job, outcome)
                 training += outcome.training
                 evaluation += outcome.evaluation
                 inside += outcome.total

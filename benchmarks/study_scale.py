@@ -26,7 +26,7 @@ from keras_pendulum.cluster import dask_cluster
 from keras_pendulum.study_folder import StudyFolder
 from keras_pendulum.study_loop import Engine, run_all
 from keras_pendulum.study_picture import study_figure
-from keras_pendulum.study_result import Result, Task, encode
+from keras_pendulum.study_result import Job, Result, encode
 from keras_pendulum.study_run import Outcome
 from keras_pendulum.study_table import make_rows
 from keras_pendulum.worker_processes import WorkerProcesses
@@ -34,12 +34,12 @@ from keras_pendulum.worker_processes import WorkerProcesses
 _ARMS = 10
 
 
-def empty_run(task: Task) -> Outcome:
+def empty_run(job: Job) -> Outcome:
     """A result of a real one's size, of nothing."""
-    seed = task.config.seed
+    seed = job.config.seed
     returns = [-(40 + (seed * 7919 + i * 104729) % 10_007 / 997) for i in range(100)]
     curve = [round(value / 200, 6) for value in returns[:50]]
-    return Outcome(encode(task, Result(-36.677, returns, curve, curve)), 0, 0, 0, "simulated")
+    return Outcome(encode(job, Result(-36.677, returns, curve, curve)), 0, 0, 0, "simulated")
 
 
 def measured(name: str, engine: Engine, runs: int, out: Path) -> Row:
@@ -53,10 +53,10 @@ def measured(name: str, engine: Engine, runs: int, out: Path) -> Row:
         for _ in run_all(engine, empty_run, folder.missing()):
             pass
         handed = time.perf_counter()
-        for task, outcome, problem in run_all(engine, empty_run, folder.missing()):
+        for job, outcome, problem in run_all(engine, empty_run, folder.missing()):
             if outcome is None:
                 raise RuntimeError(problem)
-            folder.keep(task, outcome)
+            folder.keep(job, outcome)
         made = time.perf_counter()
         if folder.missing():
             raise RuntimeError("results are missing")
@@ -68,7 +68,7 @@ def measured(name: str, engine: Engine, runs: int, out: Path) -> Row:
     size = sum(path.stat().st_size for path in (out / name).rglob("*.json"))
     row = {
         "engine": name,
-        "runs": len(folder.tasks()),
+        "runs": len(folder.jobs()),
         "handed out and answered (runs/s)": round(runs / (handed - begun)),
         "and written (runs/s)": round(runs / (made - handed)),
         "looked through (s)": round(checked - made, 1),

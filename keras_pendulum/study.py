@@ -21,7 +21,7 @@ from keras_pendulum.errors import UserError
 if TYPE_CHECKING:
     from keras_pendulum.study_folder import StudyFolder
     from keras_pendulum.study_loop import Engine
-    from keras_pendulum.study_result import Task
+    from keras_pendulum.study_result import Job
 
 _MOST_SEEDS = 100_000
 _MOST_WORKERS = 512
@@ -81,7 +81,7 @@ def _study(arguments: argparse.Namespace) -> int:
         with _engine(arguments, folder) as engine, folder.opened():
             failed = _make_runs(folder, engine)
     except KeyboardInterrupt:
-        everything = len(folder.tasks())
+        everything = len(folder.jobs())
         print(
             f"Interrupted: {everything - len(folder.missing())} of {everything} runs are in "
             f"{folder.path}; the same command goes on with the others",
@@ -90,10 +90,10 @@ def _study(arguments: argparse.Namespace) -> int:
         raise
     _report(folder, arms)
     if failed:
-        told = "; ".join(f"{_called(task)}: {problem}" for task, problem in failed[:5])
+        told = "; ".join(f"{_called(job)}: {problem}" for job, problem in failed[:5])
         more = f"; and {len(failed) - 5} more" if len(failed) > 5 else ""
         print(
-            f"error: {len(failed)} of {len(folder.tasks())} runs failed ({told}{more}); the same "
+            f"error: {len(failed)} of {len(folder.jobs())} runs failed ({told}{more}); the same "
             "command tries them again",
             file=sys.stderr,
         )
@@ -119,30 +119,30 @@ def _engine(arguments: argparse.Namespace, folder: StudyFolder) -> Iterator[Engi
         executor.shutdown(cancel_futures=True)
 
 
-def _make_runs(folder: StudyFolder, engine: Engine) -> list[tuple[Task, str]]:
+def _make_runs(folder: StudyFolder, engine: Engine) -> list[tuple[Job, str]]:
     """Makes what is missing, a line for each run; returns the runs that failed, and why."""
     from keras_pendulum.study_loop import run_all
     from keras_pendulum.study_run import train_and_score
 
-    everything, missing = folder.tasks(), folder.missing()
+    everything, missing = folder.jobs(), folder.missing()
     before = done = len(everything) - len(missing)
     if done:
         print(f"{done} of {len(everything)} runs are there already", flush=True)
-    failed: list[tuple[Task, str]] = []
+    failed: list[tuple[Job, str]] = []
     training = evaluation = 0.0
     begun = time.perf_counter()
-    for task, outcome, problem in run_all(engine, train_and_score, missing, _tell_retry):
+    for job, outcome, problem in run_all(engine, train_and_score, missing, _tell_retry):
         if outcome is None:
-            failed.append((task, problem))
-            print(f"{_called(task)}: failed, {problem}", file=sys.stderr, flush=True)
+            failed.append((job, problem))
+            print(f"{_called(job)}: failed, {problem}", file=sys.stderr, flush=True)
             continue
-        result = folder.keep(task, outcome)
+        result = folder.keep(job, outcome)
         done += 1
         training += outcome.training
         evaluation += outcome.evaluation
         left = (time.perf_counter() - begun) * (len(everything) - done) / (done - before)
         print(
-            f"{_called(task)}: regret {result.regret:.2f}, {outcome.total:.1f} s, "
+            f"{_called(job)}: regret {result.regret:.2f}, {outcome.total:.1f} s, "
             f"{done}/{len(everything)}, {int(left) // 60}:{int(left) % 60:02} left",
             flush=True,
         )
@@ -177,12 +177,12 @@ def _report(folder: StudyFolder, arms: Sequence[Arm]) -> None:
     print(f"\n{files['table.md'].decode()}\nSaved in {folder.path}: {', '.join(files)}, results/")
 
 
-def _tell_retry(task: Task, problem: str) -> None:
-    print(f"{_called(task)}: tried again, {problem}", file=sys.stderr, flush=True)
+def _tell_retry(job: Job, problem: str) -> None:
+    print(f"{_called(job)}: tried again, {problem}", file=sys.stderr, flush=True)
 
 
-def _called(task: Task) -> str:
-    return f"{task.arm}, seed {task.config.seed}"
+def _called(job: Job) -> str:
+    return f"{job.arm}, seed {job.config.seed}"
 
 
 def _require_range(flag: str, value: int, most: int) -> None:

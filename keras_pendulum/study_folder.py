@@ -17,7 +17,7 @@ from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.config import Config
 from keras_pendulum.errors import UserError
 from keras_pendulum.folder_lock import held
-from keras_pendulum.study_result import Result, Task, decode, installed_versions
+from keras_pendulum.study_result import Job, Result, decode, installed_versions
 from keras_pendulum.study_run import Outcome, require_versions
 
 _LOG_COLUMNS = ("arm", "seed", "worker", "training", "evaluation", "total")
@@ -76,32 +76,32 @@ class StudyFolder:
                 write_atomically(self._log, (",".join(_LOG_COLUMNS) + "\n").encode())
             yield
 
-    def tasks(self) -> list[Task]:
+    def jobs(self) -> list[Job]:
         """Every run of the study: seed by seed, so that all arms grow alike."""
         return [
-            Task(arm.name, arm.slug, replace(arm.config, seed=seed), self.versions)
+            Job(arm.name, arm.slug, replace(arm.config, seed=seed), self.versions)
             for seed in range(self._seeds)
             for arm in self._maker.values()
         ]
 
-    def missing(self) -> list[Task]:
+    def missing(self) -> list[Job]:
         """The runs that have no sound result yet."""
-        return [task for task in self.tasks() if self._read(task) is None]
+        return [job for job in self.jobs() if self._read(job) is None]
 
-    def keep(self, task: Task, outcome: Outcome) -> Result:
+    def keep(self, job: Job, outcome: Outcome) -> Result:
         """Writes a result atomically, and what it cost to the log.
 
         Raises UserError when it is damaged or cannot be written, or the folder was moved.
         """
-        result = decode(outcome.result, task)
+        result = decode(outcome.result, job)
         if result is None:
-            raise UserError(f"{outcome.worker} sent a damaged result of {task.arm}")
+            raise UserError(f"{outcome.worker} sent a damaged result of {job.arm}")
         self._require_in_place()
-        write_atomically(self._file(task), outcome.result)
+        write_atomically(self._file(job), outcome.result)
         seconds = (outcome.training, outcome.evaluation, outcome.total)
         line = io.StringIO()
         csv.writer(line, lineterminator="\n").writerow(
-            [task.arm, task.config.seed, outcome.worker, *(f"{value:.3f}" for value in seconds)]
+            [job.arm, job.config.seed, outcome.worker, *(f"{value:.3f}" for value in seconds)]
         )
         try:
             with open(self._log, "a", encoding="utf-8") as file:
@@ -117,22 +117,22 @@ class StudyFolder:
     def results(self) -> dict[str, list[Result]]:
         """The sound results of each arm by its name, in the order of their seeds."""
         made: dict[Config, list[Result]] = {training: [] for training in self._maker}
-        for task, training in zip(self.tasks(), [*self._maker] * self._seeds, strict=True):
-            result = self._read(task)
+        for job, training in zip(self.jobs(), [*self._maker] * self._seeds, strict=True):
+            result = self._read(job)
             if result is not None:
                 made[training].append(result)
         return {arm.name: made[arm.training] for arm in self._arms}
 
-    def _file(self, task: Task) -> Path:
-        return self._results / task.slug / f"{task.slug}-seed{task.config.seed}.json"
+    def _file(self, job: Job) -> Path:
+        return self._results / job.slug / f"{job.slug}-seed{job.config.seed}.json"
 
-    def _read(self, task: Task) -> Result | None:
+    def _read(self, job: Job) -> Result | None:
         try:
-            return decode(self._file(task).read_bytes(), task)
+            return decode(self._file(job).read_bytes(), job)
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise UserError(f"cannot read {self._file(task)}: {error.strerror}") from error
+            raise UserError(f"cannot read {self._file(job)}: {error.strerror}") from error
 
     def _described(self) -> dict[str, Any]:
         arms = [

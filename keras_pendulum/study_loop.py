@@ -9,7 +9,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple
 
 from keras_pendulum.errors import UserError
-from keras_pendulum.study_result import Task
+from keras_pendulum.study_result import Job
 from keras_pendulum.study_run import Outcome
 
 ATTEMPTS = 3
@@ -29,55 +29,55 @@ class Engine(NamedTuple):
 class Ended(NamedTuple):
     """A run that needs no more work: with an outcome, or with what went wrong each time."""
 
-    task: Task
+    job: Job
     outcome: Outcome | None
     problem: str = ""
 
 
 def run_all(
     engine: Engine,
-    work: Callable[[Task], Outcome],
-    tasks: Iterable[Task],
-    on_retry: Callable[[Task, str], None] = lambda task, problem: None,
+    work: Callable[[Job], Outcome],
+    jobs: Iterable[Job],
+    on_retry: Callable[[Job, str], None] = lambda job, problem: None,
 ) -> Iterator[Ended]:
     """Yields each run as it ends, in no certain order.
 
     A run that fails or loses its worker is made up to three times. One that raises UserError would
     do so again, and is not. Raises UserError when the engine has gone as a whole.
     """
-    waiting = iter(tasks)
+    waiting = iter(jobs)
     ended: SimpleQueue[Future[Outcome]] = SimpleQueue()
-    running: dict[Future[Outcome], tuple[Task, int]] = {}
+    running: dict[Future[Outcome], tuple[Job, int]] = {}
 
-    def start(task: Task, attempt: int = 1) -> None:
-        future: Future[Any] = engine.executor.submit(work, task)
-        running[future] = task, attempt
+    def start(job: Job, attempt: int = 1) -> None:
+        future: Future[Any] = engine.executor.submit(work, job)
+        running[future] = job, attempt
         future.add_done_callback(ended.put)
 
-    for task in islice(waiting, engine.in_flight):
-        start(task)
+    for job in islice(waiting, engine.in_flight):
+        start(job)
     while running:
         try:
             future = ended.get(timeout=_PATIENCE)
         except Empty:
             engine.require()
             continue
-        task, attempt = running.pop(future)
+        job, attempt = running.pop(future)
         problem = _problem(future)
         if problem is not None:
             engine.require()
         final = isinstance(problem, (UserError, *engine.hopeless)) or attempt == ATTEMPTS
         if problem is not None and not final:
-            on_retry(task, _told(problem))
-            start(task, attempt + 1)
+            on_retry(job, _told(problem))
+            start(job, attempt + 1)
             continue
         # The worker goes on before the caller writes the result.
         for following in islice(waiting, 1):
             start(following)
         if problem is None:
-            yield Ended(task, future.result())
+            yield Ended(job, future.result())
         else:
-            yield Ended(task, None, _told(problem))
+            yield Ended(job, None, _told(problem))
 
 
 def _problem(future: Future[Outcome]) -> BaseException | None:

@@ -14,7 +14,7 @@ EPISODES_A_POINT = 10  # of a learning curve
 _ENOUGH_DIGITS = 6  # of a curve's points, after the decimal point
 
 
-class Task(NamedTuple):
+class Job(NamedTuple):
     """A run that is to be made: what a worker is sent."""
 
     arm: str
@@ -56,17 +56,17 @@ def thinned(values: list[float]) -> list[float]:
     return [round(sum(part) / len(part), _ENOUGH_DIGITS) for part in parts]
 
 
-def encode(task: Task, result: Result) -> bytes:
+def encode(job: Job, result: Result) -> bytes:
     """A small JSON file with its own digest; equal results are equal byte for byte."""
-    content = {**_head(task), "regret": result.regret, **result._asdict()}
+    content = {**_head(job), "regret": result.regret, **result._asdict()}
     return _sealed(content)
 
 
-def decode(data: bytes, task: Task) -> Result | None:
-    """What `encode` wrote for this task; None for damaged bytes and for those of another task."""
+def decode(data: bytes, job: Job) -> Result | None:
+    """What `encode` wrote for this job; None for damaged bytes and for those of another job."""
     try:
         content = json.loads(data)["result"]
-        head = _head(task)
+        head = _head(job)
         if _sealed(content) != data or {key: content[key] for key in head} != head:
             return None
         return Result(*(content[field] for field in Result._fields))
@@ -74,14 +74,14 @@ def decode(data: bytes, task: Task) -> Result | None:
         return None
 
 
-def _head(task: Task) -> dict[str, Any]:
-    settings = dict(vars(task.config))  # `asdict` copies deeply, which takes ten times as long
+def _head(job: Job) -> dict[str, Any]:
+    settings = dict(vars(job.config))  # `asdict` copies deeply, which takes ten times as long
     settings["hidden_units"] = list(settings["hidden_units"])  # as JSON gives it back
     return {
-        "arm": task.arm,
+        "arm": job.arm,
         "seed": settings.pop("seed"),
         "config": settings,
-        "versions": task.versions,
+        "versions": job.versions,
         "episodes_a_point": EPISODES_A_POINT,
     }
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from keras_pendulum.backend import keep_to_one_thread, quick_import
 from keras_pendulum.environment import TASKS
 from keras_pendulum.errors import UserError
-from keras_pendulum.study_result import Result, Task, encode, installed_versions, thinned
+from keras_pendulum.study_result import Job, Result, encode, installed_versions, thinned
 
 _EVALUATION_EPISODES = 100
 
@@ -25,19 +25,19 @@ class Outcome(NamedTuple):
     worker: str  # host and process
 
 
-def train_and_score(task: Task) -> Outcome:
+def train_and_score(job: Job) -> Outcome:
     """Trains, evaluates on the starts of seeds 0 to 99, and gives back the bytes to keep.
 
     Raises UserError when this worker's versions are not the study's, or learning has diverged.
     """
     begun = time.perf_counter()
-    require_versions(task.versions, installed_versions(), f"the worker {_name()}")
+    require_versions(job.versions, installed_versions(), f"the worker {_name()}")
     keep_to_one_thread()
     with quick_import():
         from keras_pendulum.evaluation import evaluate_policy
         from keras_pendulum.training import train_dqn
     started = time.perf_counter()
-    trained = train_dqn(task.config)
+    trained = train_dqn(job.config)
     middle = time.perf_counter()
     score = evaluate_policy(trained.network, _EVALUATION_EPISODES)
     ended = time.perf_counter()
@@ -50,7 +50,7 @@ def train_and_score(task: Task) -> Outcome:
         average_rewards=thinned([record.average_reward for record in trained.history]),
         episode_returns=thinned([record.episode_return for record in trained.history]),
     )
-    data = encode(task, result)
+    data = encode(job, result)
     total = time.perf_counter() - begun
     return Outcome(data, middle - started, ended - middle, total, _name())
 

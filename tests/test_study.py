@@ -27,8 +27,8 @@ from keras_pendulum.errors import UserError
 from keras_pendulum.presets import preset
 from keras_pendulum.study_folder import StudyFolder
 from keras_pendulum.study_result import (
+    Job,
     Result,
-    Task,
     decode,
     encode,
     installed_versions,
@@ -151,8 +151,8 @@ def test_cartpoles_regret_is_what_lacks_to_500_and_a_run_asks_for_one_thread(
     asked = []
     monkeypatch.setattr(study_run, "keep_to_one_thread", lambda: asked.append("one thread"))
     config = preset("cartpole", hidden_units=(8,), episodes=1)
-    task = Task("pole", "pole", config, installed_versions())
-    result = decode(train_and_score(task).result, task)
+    job = Job("pole", "pole", config, installed_versions())
+    result = decode(train_and_score(job).result, job)
     assert result is not None
     assert result.best_mean_return == 500
     assert 0 < result.regret == 500 - sum(result.returns) / 100 < 500
@@ -302,18 +302,18 @@ def test_other_versions_elsewhere_are_told(finished: Path, tmp_path: Path) -> No
     assert len(folder.missing()) == 4  # results of other versions are not taken for this study's
 
 
-def outcome(task: Task) -> Outcome:
+def outcome(job: Job) -> Outcome:
     """A run that was made without learning."""
-    return Outcome(encode(task, Result(0.0, [-1.5], [-0.1], [-1.5])), 1.0, 2.0, 4.0, "there:7")
+    return Outcome(encode(job, Result(0.0, [-1.5], [-0.1], [-1.5])), 1.0, 2.0, 4.0, "there:7")
 
 
 def test_runs_that_fail_are_told_and_the_same_command_tries_them_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def diverge(task: Task) -> Outcome:
-        if (task.arm, task.config.seed) == ("starved", 0):
+    def diverge(job: Job) -> Outcome:
+        if (job.arm, job.config.seed) == ("starved", 0):
             raise UserError("the loss is nan")
-        return outcome(task)
+        return outcome(job)
 
     monkeypatch.setattr("keras_pendulum.worker_processes.WorkerProcesses", ThreadPoolExecutor)
     monkeypatch.setattr(study_run, "train_and_score", diverge)
@@ -344,7 +344,7 @@ def test_a_result_that_came_damaged_is_refused_and_a_sound_ones_cost_is_noted(
 ) -> None:
     folder = StudyFolder(tmp_path / "study", own_arms(["reference"], []), 2)
     with folder.opened():
-        one, two = folder.tasks()
+        one, two = folder.jobs()
         for data in (outcome(one).result[:-9], outcome(two).result):  # cut, and of another run
             with pytest.raises(UserError, match="there:7 sent a damaged result of reference"):
                 folder.keep(one, outcome(one)._replace(result=data))
@@ -369,7 +369,7 @@ def test_no_result_goes_into_a_folder_that_took_the_studys_place(tmp_path: Path)
     link.symlink_to(place)
     folder = StudyFolder(link, own_arms(["reference"], []), 2)
     with folder.opened():
-        one, two = folder.tasks()
+        one, two = folder.jobs()
         link.unlink()
         link.symlink_to(tmp_path)
         folder.keep(one, outcome(one))
@@ -382,11 +382,11 @@ def test_no_result_goes_into_a_folder_that_took_the_studys_place(tmp_path: Path)
 
 
 def test_a_worker_of_another_version_makes_no_run() -> None:
-    task = Task("arm", "arm", preset("reference"), {**installed_versions(), "keras": "2.0"})
+    job = Job("arm", "arm", preset("reference"), {**installed_versions(), "keras": "2.0"})
     with pytest.raises(
         UserError, match=r"the worker .* has keras .*, this study 2\.0: use the same"
     ):
-        train_and_score(task)
+        train_and_score(job)
 
 
 def test_help_comes_without_numpy() -> None:

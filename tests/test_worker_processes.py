@@ -18,7 +18,7 @@ from keras_pendulum import study_loop
 from keras_pendulum.errors import UserError
 from keras_pendulum.presets import preset
 from keras_pendulum.study_loop import Engine, run_all
-from keras_pendulum.study_result import Result, Task, encode
+from keras_pendulum.study_result import Job, Result, encode
 from keras_pendulum.study_run import Outcome
 from keras_pendulum.worker_processes import CallFailedError, WorkerDiedError, WorkerProcesses
 
@@ -82,8 +82,8 @@ def test_a_worker_at_work_ends_with_the_process_that_asked_it() -> None:
         assert process.communicate(timeout=50)[0] == b""
 
 
-def task(seed: int) -> Task:
-    return Task("arm", "arm", preset("reference", seed=seed), {})
+def job(seed: int) -> Job:
+    return Job("arm", "arm", preset("reference", seed=seed), {})
 
 
 class Flaky:
@@ -92,20 +92,20 @@ class Flaky:
     def __init__(self, error: Exception, times: dict[int, int]) -> None:
         self.error, self.left, self.made = error, times, list[int]()
 
-    def __call__(self, task: Task) -> Outcome:
-        seed = task.config.seed
+    def __call__(self, job: Job) -> Outcome:
+        seed = job.config.seed
         self.made.append(seed)
         if self.left.get(seed, 0) > 0:
             self.left[seed] -= 1
             raise self.error
-        return Outcome(encode(task, Result(0.0, [0.0], [], [])), 0, 0, 0, "here")
+        return Outcome(encode(job, Result(0.0, [0.0], [], [])), 0, 0, 0, "here")
 
 
 def test_a_run_that_dies_is_made_up_to_three_times_and_the_others_go_on() -> None:
     work = Flaky(OSError("gone"), {1: 2, 2: 99})
     with ThreadPoolExecutor(1) as executor:
         engine = Engine(executor, 2, lambda: 1)
-        ended = {each.task.config.seed: each for each in run_all(engine, work, map(task, range(5)))}
+        ended = {each.job.config.seed: each for each in run_all(engine, work, map(job, range(5)))}
     assert sorted(work.made) == [0, 1, 1, 1, 2, 2, 2, 3, 4]
     assert [seed for seed, each in ended.items() if each.outcome is None] == [2]
     assert ended[2].problem == "OSError: gone"
@@ -120,7 +120,7 @@ def test_a_users_mistake_is_not_tried_again_nor_what_the_engine_holds_hopeless(
 ) -> None:
     work = Flaky(error, {0: 99})
     with ThreadPoolExecutor(1) as executor:
-        (ended,) = run_all(Engine(executor, 2, lambda: 1, hopeless=(OSError,)), work, [task(0)])
+        (ended,) = run_all(Engine(executor, 2, lambda: 1, hopeless=(OSError,)), work, [job(0)])
     assert (work.made, ended.outcome, ended.problem) == ([0], None, told)
 
 
@@ -129,7 +129,7 @@ def test_a_run_that_fails_because_the_engine_has_gone_is_not_tried_again() -> No
     with ThreadPoolExecutor(1) as executor:
         engine = Engine(executor, 2, lambda: 1, partial(fail, UserError("no engine")))
         with pytest.raises(UserError, match="no engine"):
-            list(run_all(engine, work, [task(0)]))
+            list(run_all(engine, work, [job(0)]))
     assert work.made == [0]
 
 
@@ -143,24 +143,24 @@ def test_an_engine_that_has_gone_is_noticed_while_no_run_ends(
         noticed.set()
         raise UserError("no engine")
 
-    def work(task: Task) -> Outcome:
+    def work(job: Job) -> Outcome:
         noticed.wait(20)
-        return Flaky(OSError(), {})(task)
+        return Flaky(OSError(), {})(job)
 
     with ThreadPoolExecutor(1) as executor, pytest.raises(UserError, match="no engine"):
-        list(run_all(Engine(executor, 1, lambda: 1, require), work, [task(0)]))
+        list(run_all(Engine(executor, 1, lambda: 1, require), work, [job(0)]))
 
 
 def test_runs_are_handed_out_a_few_at_a_time() -> None:
     handed = []
 
-    def tasks() -> object:
+    def jobs() -> object:
         for seed in range(1000):
             handed.append(seed)
-            yield task(seed)
+            yield job(seed)
 
     with ThreadPoolExecutor(1) as executor:
-        runs = run_all(Engine(executor, 3, lambda: 1), Flaky(OSError(), {}), tasks())  # type: ignore[arg-type]
+        runs = run_all(Engine(executor, 3, lambda: 1), Flaky(OSError(), {}), jobs())  # type: ignore[arg-type]
         next(runs)
         assert len(handed) <= 4
         assert len(list(runs)) == 999
