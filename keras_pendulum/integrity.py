@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import os
-from typing import Any, BinaryIO
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
 
 from keras_pendulum.atomic_file import write_atomically
 from keras_pendulum.errors import WeightsError
@@ -17,10 +19,14 @@ _MARK = b"\nkeras_pendulum sha256 "
 _SEAL = len(_MARK) + 64  # bytes
 
 
-def write_sealed(path: str | os.PathLike[str], content: bytes, **options: Any) -> None:
+def write_sealed(
+    path: str | os.PathLike[str],
+    content: bytes,
+    check: Callable[[Path], object] = lambda file: None,
+) -> None:
     """As `write_atomically`, the content with its digest behind it."""
     digest = hashlib.sha256(content).hexdigest()
-    write_atomically(path, content, _MARK + digest.encode(), **options)
+    write_atomically(path, content, _MARK + digest.encode(), check=check)
 
 
 def verify(file: BinaryIO, path: str | os.PathLike[str]) -> None:

@@ -93,7 +93,11 @@ class RunFolder:
 
         Raises UserError when it cannot be removed.
         """
-        _remove(*self._others, *self._event_files())
+        _remove(*self._others)
+        if events := self._event_files():
+            _remove(*events)
+            with contextlib.suppress(OSError):  # which holds something else too
+                self.events.rmdir()
 
     def begin(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
         """Writes the settings, and the history of the episodes before a resumed run goes on.

@@ -185,8 +185,11 @@ def test_a_folder_that_happens_to_be_called_tensorboard_is_nobodys_to_empty(
 ) -> None:
     (tmp_path / "tensorboard").mkdir()
     (tmp_path / "tensorboard" / "my_best.h5").write_bytes(b"a policy")
+    if overwrite:
+        (tmp_path / "tensorboard" / "events.out.tfevents.1.host").touch()
     config = kp.preset("original", episodes=1, hidden_units=(8,))
     kp.train_dqn(config, tmp_path, overwrite=overwrite)
+    assert len(list((tmp_path / "tensorboard").iterdir())) == 1
     assert (tmp_path / "tensorboard" / "my_best.h5").read_bytes() == b"a policy"
 
 
