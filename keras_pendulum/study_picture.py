@@ -48,7 +48,8 @@ def study_figure(rows: Sequence[Row], results: Mapping[str, Sequence[Result]]) -
     drawn = [row for row in rows if row.arm.curve]
     styles = {row.arm.name: _style(place) for place, row in enumerate(drawn)}
     tasks = list(dict.fromkeys(row.arm.task for row in drawn))
-    height = max(6.5, 1.5 + 0.55 * len(rows), 4.0 * len(tasks))
+    # A panel needs 4 inches for its axis and its name, and a line for each curve in its legend.
+    height = max(6.5, 1.5 + 0.55 * len(rows), 4.0 * len(tasks) + 0.2 * len(drawn))
     figure = Figure(figsize=(13, height), layout="constrained")
     grid = figure.add_gridspec(max(1, len(tasks)), 2, width_ratios=(1, 1.05))
     _draw_regrets(figure.add_subplot(grid[:, 0]), rows, styles)

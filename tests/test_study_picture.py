@@ -54,3 +54,18 @@ def test_more_arms_than_colours_have_their_curves_and_tell_themselves_apart(
     assert len({(line.get_color(), line.get_marker()) for line in lines}) == 13
     dashes = [(color, dashes) for color, dashes, _ in map(_style, range(24))]
     assert len(set(dashes)) == 24
+
+
+def test_the_names_of_the_axes_are_on_the_picture_however_long_the_legends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    many = [f"arm{n}: reference" for n in range(10)]
+    drawn = panels([], [*many, "pole: cartpole"], monkeypatch)
+    for lines in drawn.values():
+        axes = next(iter(lines.values())).axes
+        assert axes is not None
+        figure = axes.get_figure(root=True)
+        assert figure is not None
+        figure.draw_without_rendering()
+        name = axes.yaxis.label.get_window_extent()
+        assert 0 < name.y0 < name.y1 < figure.bbox.y1
