@@ -1,7 +1,6 @@
-"""The inverted pendulum's DQN, faithful to the original and put right.
+"""A DQN for the inverted pendulum: a student's original and the same design without its defects.
 
-The names below are the package's whole outside; TensorFlow is imported when the first of them
-that needs it is used.
+The names below are the public API. The first use of one imports what it needs.
 """
 
 from __future__ import annotations
@@ -9,19 +8,22 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.backend import prepare_environment, quick_import, require_tensorflow
-
-__version__ = "0.1.0"
+from keras_pendulum.tensorflow_setup import (
+    fast_import,
+    require_tensorflow,
+    set_environment_defaults,
+)
+from keras_pendulum.version import __version__
 
 if TYPE_CHECKING:
-    from keras_pendulum.config import Config
+    from keras_pendulum.config.config import Config
+    from keras_pendulum.config.presets import preset
+    from keras_pendulum.dqn.network import DQN
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
-    from keras_pendulum.evaluation import Score, evaluate_policy
-    from keras_pendulum.network import DQN
-    from keras_pendulum.optimum import optimal_return
-    from keras_pendulum.presets import preset
-    from keras_pendulum.training import TrainingResult, train_dqn
-    from keras_pendulum.weights import find_weights, load_weights, save_weights
+    from keras_pendulum.evaluate.evaluation import Score, evaluate_policy
+    from keras_pendulum.optimum.optimal_return import optimal_return
+    from keras_pendulum.storage.weights import find_weights, load_weights, save_weights
+    from keras_pendulum.train.train_dqn import TrainingResult, train_dqn
 
 __all__ = [
     "DQN",
@@ -31,6 +33,7 @@ __all__ = [
     "TrainingResult",
     "UserError",
     "WeightsError",
+    "__version__",
     "evaluate_policy",
     "find_weights",
     "load_weights",
@@ -40,25 +43,28 @@ __all__ = [
     "train_dqn",
 ]
 
-_HOMES = {
+_MODULES = {
+    "config.config": ("Config",),
+    "config.presets": ("preset",),
+    "dqn.network": ("DQN",),
     "errors": ("ConfigError", "UserError", "WeightsError"),
-    "evaluation": ("Score", "evaluate_policy"),
-    "network": ("DQN",),
-    "optimum": ("optimal_return",),
-    "config": ("Config",),
-    "presets": ("preset",),
-    "training": ("TrainingResult", "train_dqn"),
-    "weights": ("find_weights", "load_weights", "save_weights"),
+    "evaluate.evaluation": ("Score", "evaluate_policy"),
+    "optimum.optimal_return": ("optimal_return",),
+    "storage.weights": ("find_weights", "load_weights", "save_weights"),
+    "train.train_dqn": ("TrainingResult", "train_dqn"),
 }
 
-
-prepare_environment()
+set_environment_defaults()
 
 
 def __getattr__(name: str) -> Any:
-    for home, names in _HOMES.items():
+    for module, names in _MODULES.items():
         if name in names:
             require_tensorflow()
-            with quick_import():
-                return getattr(importlib.import_module(f"keras_pendulum.{home}"), name)
+            with fast_import():
+                return getattr(importlib.import_module(f"keras_pendulum.{module}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

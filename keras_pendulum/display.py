@@ -1,4 +1,4 @@
-"""Whether there is a screen to draw on."""
+"""Checks for a display before pygame opens a window."""
 
 from __future__ import annotations
 
@@ -9,34 +9,37 @@ from keras_pendulum.errors import UserError
 
 
 def require_display() -> None:
-    """Raises UserError when no window can be opened; to be called before TensorFlow is imported.
+    """Raises UserError when no window can be opened. Call it before TensorFlow is imported.
 
-    Without a screen SDL falls back to drawing off-screen, which shows nothing and crashes beside
+    Without a display, SDL draws off-screen. That shows nothing, and it crashes in a process with
     TensorFlow.
     """
-    x, *others = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"))
-    linux = sys.platform == "linux"
-    hopeless = linux and not x and not any(others)
-    if not hopeless:
-        if linux and not any(others):
-            os.environ["SDL_VIDEODRIVER"] = "x11"  # else it tries Wayland too, which complains
-        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        import pygame
-
-        try:
-            pygame.display.init()
-            driver = pygame.display.get_driver()
-            hopeless = driver == "offscreen"
-            if driver == "x11":
-                # SDL would put its pictures up by way of OpenGL, whose drivers may bring an LLVM
-                # that crashes beside TensorFlow's. Other systems have no other way.
-                os.environ.setdefault("SDL_FRAMEBUFFER_ACCELERATION", "0")
-        except pygame.error:
-            hopeless = True
-    if hopeless:
+    if not _opens_display():
         raise UserError("there is no display to open a window on")
 
 
+def _opens_display() -> bool:
+    """Chooses SDL's video driver; returns whether SDL can open a window with it."""
+    x, *others = map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"))
+    if sys.platform == "linux" and not any(others):
+        if not x:
+            return False
+        os.environ["SDL_VIDEODRIVER"] = "x11"  # else SDL tries Wayland too and prints an error
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    import pygame
+
+    try:
+        pygame.display.init()
+    except pygame.error:
+        return False
+    driver = pygame.display.get_driver()
+    if driver == "x11":
+        # By default SDL shows its pictures with OpenGL, and an OpenGL driver may load an LLVM that
+        # crashes together with TensorFlow's. On other systems SDL has no other way.
+        os.environ.setdefault("SDL_FRAMEBUFFER_ACCELERATION", "0")
+    return driver != "offscreen"
+
+
 def draw_without_display() -> None:
-    """Keeps SDL from looking for a screen, which it does aloud, where only images are made."""
+    """Makes SDL draw images without a display; its search for one prints errors."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")

@@ -1,13 +1,13 @@
-"""What a user can get wrong, told in one line."""
+"""Errors that a user can correct; each message is one line."""
 
 
 class UserError(Exception):
-    """A mistake that the user can mend. The message is one line: what was found, what to do."""
+    """A mistake of the user. The message says what was found and what to do."""
 
 
 class ConfigError(UserError, ValueError):
-    """A setting that no run can have."""
+    """A setting with a value that no run can have."""
 
 
 class WeightsError(UserError, ValueError):
-    """A weights file that cannot be read, or does not hold what it should."""
+    """A weights file that cannot be read, or does not hold the expected network."""

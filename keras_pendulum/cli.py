@@ -1,0 +1,101 @@
+"""The command line: one line per error, the exit status, and Ctrl-C."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import os
+import signal
+import sys
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from keras_pendulum.errors import UserError
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """An argument parser that prints errors as one line and supports shell completion."""
+
+    def error(self, message: str) -> NoReturn:
+        """Prints the error and exits with status 2."""
+        self.exit(2, f"error: {_one_line(message)}\n")
+
+    def parse_args(self, *words: Any) -> Any:  # type: ignore[override]
+        """Parses the command line; prints completions and exits where a shell asks for them."""
+        _prepare_output()
+        if "_ARGCOMPLETE" in os.environ:
+            import argcomplete
+
+            argcomplete.autocomplete(self)
+        return super().parse_args(*words)
+
+
+class ControlC:
+    """A context in which Ctrl-C raises KeyboardInterrupt.
+
+    The C code of pygame may drop the exception. `check` raises it again.
+    """
+
+    def __init__(self) -> None:
+        self._pressed = False
+        self._before = signal.getsignal(signal.SIGINT)
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt if Ctrl-C was pressed."""
+        if self._pressed:
+            raise KeyboardInterrupt
+
+    def __enter__(self) -> ControlC:
+        # A process that ignores Ctrl-C, or has its own handler, stays as it is.
+        if self._before is signal.default_int_handler:
+            signal.signal(signal.SIGINT, self._on_signal)
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _on_signal(self, number: int, frame: object) -> None:
+        self._pressed = True
+        self.check()
+
+
+def run_command(command: Callable[[], int]) -> int:
+    """Returns the exit status of `command`; a UserError is one line on stderr and status 2."""
+    try:
+        status = command()
+        sys.stdout.flush()
+        return status
+    except UserError as error:
+        print(f"error: {_one_line(str(error))}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    except OSError as error:
+        # The reader of the output has exited, or the disk is full. Without this, Python prints a
+        # second error when it flushes.
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):
+            return 1
+        print(f"error: {_one_line(str(error))}", file=sys.stderr)
+        return 2
+
+
+def _prepare_output() -> None:
+    """Lets `print` succeed where the output is closed or cannot encode a character."""
+    if sys.stdout is None:  # closed by the parent process
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="replace")
+
+
+def _one_line(message: str) -> str:
+    return " ".join(message.splitlines())
+
+
+def nonempty_path(text: str) -> str:
+    """Returns a path from the command line. Raises ArgumentTypeError for an empty one."""
+    if not text:
+        raise argparse.ArgumentTypeError("the name is empty")
+    return text

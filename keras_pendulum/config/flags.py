@@ -1,0 +1,69 @@
+"""Command-line flags for the settings of the Config."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import fields
+from typing import Any
+
+from keras_pendulum.config.config import RENAMED, Config, parse_setting
+from keras_pendulum.config.fields import Switch, Text, format_value, kind_of
+from keras_pendulum.config.presets import PRESETS
+from keras_pendulum.errors import ConfigError
+
+
+def add_config_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds one flag for each setting but `preset`; a flag that is not typed stays unset."""
+    group = parser.add_argument_group("settings (each preset has its own defaults)")
+    for spec in fields(Config):
+        if spec.name != "preset":
+            kind = kind_of(spec)
+            choices = kind.choices if isinstance(kind, Text) else None
+            group.add_argument(
+                _flag(spec.name),
+                dest=spec.name,
+                action=_Setting,
+                choices=choices or None,
+                default=argparse.SUPPRESS,
+                metavar=None if choices else "{true,false}" if isinstance(kind, Switch) else "N",
+                help=f"{spec.metadata['help']} [{_defaults(spec.name)}]".replace("%", "%%"),
+            )
+    for name in RENAMED:
+        parser.add_argument(_flag(name), dest=name, action=_Setting, help=argparse.SUPPRESS)
+
+
+def settings_from_args(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Returns the settings that the user typed, without the preset."""
+    names = {spec.name for spec in fields(Config)} - {"preset"}
+    return {name: value for name, value in vars(arguments).items() if name in names}
+
+
+class _Setting(argparse.Action):
+    """An argparse action that parses a setting; for an old name, the error says the new one."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        try:
+            setattr(namespace, self.dest, parse_setting(self.dest, values))
+        except ConfigError as error:
+            parser.error(str(error))
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _defaults(name: str) -> str:
+    """Returns the setting's default in `reference`, and in the presets that repeat an original."""
+    shown = ("reference", "original", "cartpole-original")
+    values = {preset: format_value(getattr(PRESETS[preset], name)) for preset in shown}
+    return ", ".join(
+        f"{preset}: {value}"
+        for preset, value in values.items()
+        if preset == "reference" or value != values["reference"]
+    )

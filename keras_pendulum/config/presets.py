@@ -1,0 +1,113 @@
+"""The presets: Configs with names, each a change to another one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from keras_pendulum.config.config import Config, require_known
+from keras_pendulum.errors import ConfigError
+
+_REFERENCE = Config()
+# The final listing of the inverted-pendulum page (July 2023), with its defects.
+_ORIGINAL = replace(
+    _REFERENCE,
+    preset="original",
+    replay_capacity=8000,
+    updates_per_episode=1,
+    learning_rate_schedule="constant",
+    target_update="none",
+)
+# The runnable block of the step-by-step listing on the same page.
+_WALKTHROUGH = replace(
+    _ORIGINAL,
+    preset="walkthrough",
+    episodes=400,
+    hidden_units=(128, 64, 32),
+    replay_capacity=4000,
+    batch_size=64,
+    stored_index="truncated",
+)
+
+# The standard, harder task: at g = 10 the torque cannot lift the pendulum in one swing.
+_SWINGUP = replace(
+    _REFERENCE,
+    preset="swingup",
+    gravity=10.0,
+    episodes=1700,
+    max_episode_steps=60,
+    batch_size=64,
+    discount=0.98,
+    reward_scale=0.02,
+    epsilon_decay=0.997,
+)
+
+# The agent of the two PyTorch notebooks, with their numbers.
+_CARTPOLE_ORIGINAL = Config(
+    preset="cartpole-original",
+    environment="CartPole-v1",
+    gravity=None,
+    episodes=600,
+    max_episode_steps=500,
+    hidden_units=(128, 128),
+    activation="relu",
+    initial_weights="fan-in",
+    replay_capacity=10_000,
+    batch_size=128,
+    discount=0.99,
+    loss="huber",
+    epsilon_schedule="steps",
+    epsilon_start=0.9,
+    epsilon_min=0.05,
+    train_frequency="step",
+    optimizer="adamw",
+    optimizer_epsilon=1e-8,
+    weight_decay=0.01,
+    gradient_clip=100.0,
+    learning_rate=1e-4,
+    learning_rate_schedule="constant",
+    tau=0.005,
+)
+
+# The same network on the same task, tuned to balance the pole for all 500 steps.
+_CARTPOLE = replace(
+    _CARTPOLE_ORIGINAL,
+    preset="cartpole",
+    episodes=800,
+    # The whole run: without the early falls in the buffer, the values diverge.
+    replay_capacity=400_000,
+    reward_scale=0.01,
+    double_q=True,
+    epsilon_schedule="episodes",
+    epsilon_decay=0.98,
+    train_frequency="episode",
+    updates_per_episode=120,
+    weight_decay=0.05,
+    learning_rate=1e-3,
+    learning_rate_schedule="cosine",
+    tau=0.02,
+)
+
+PRESETS: dict[str, Config] = {
+    config.preset: config
+    for config in (
+        _REFERENCE,
+        _ORIGINAL,
+        _WALKTHROUGH,
+        _SWINGUP,
+        _CARTPOLE_ORIGINAL,
+        _CARTPOLE,
+    )
+}
+
+
+def preset(name: str = "reference", **changes: Any) -> Config:
+    """Returns the preset `name` with some settings changed.
+
+    Raises ConfigError for an unknown preset or setting, and for a value out of range.
+    """
+    if name not in PRESETS:
+        raise ConfigError(f"unknown preset {name!r}; expected one of {', '.join(PRESETS)}")
+    for setting in changes:
+        require_known(setting)
+    return replace(PRESETS[name], **changes)

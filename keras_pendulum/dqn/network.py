@@ -1,0 +1,101 @@
+"""The Q-network: observations in, one value per action out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import keras
+
+_DTYPE = "float32"  # also where the user's keras.json names another one
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """The run that a network comes from, as far as its file records it."""
+
+    environment: str = "Pendulum-v1"
+    gravity: float | None = None  # m/s²
+    preset: str | None = None
+    seed: int | None = None
+    config: str | None = None  # the settings of the run, as JSON
+
+
+class DQN(keras.Model):
+    """Dense layers with an activation, then a linear output for each action.
+
+    The constructor builds the weights. They depend on `seed` alone: `glorot` is uniform within
+    ±√(6 / (inputs + outputs)) with biases 0, `fan-in` is uniform within ±1/√inputs, biases too.
+    """
+
+    def __init__(
+        self,
+        hidden_units: Sequence[int] = (512, 256, 128),
+        action_count: int = 41,
+        *,
+        observation_size: int = 3,
+        activation: str = "tanh",
+        initial_weights: str = "glorot",
+        seed: int = 0,
+        provenance: Provenance | None = None,
+    ) -> None:
+        super().__init__(name="dqn", dtype=_DTYPE)
+        self.hidden_units = tuple(hidden_units)
+        self.action_count = action_count
+        self.observation_size = observation_size
+        self.activation = activation
+        self.provenance = provenance or Provenance()
+        seeds = keras.random.SeedGenerator(seed)
+
+        def dense(name: str, inputs: int, units: int, activation: str | None) -> keras.layers.Dense:
+            kernel: Any = keras.initializers.GlorotUniform(seed=seeds)
+            bias: Any = "zeros"
+            if initial_weights == "fan-in":
+                limit = inputs**-0.5
+                kernel = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
+                bias = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
+            return keras.layers.Dense(
+                units,
+                activation,
+                kernel_initializer=kernel,
+                bias_initializer=bias,
+                name=name,
+                dtype=_DTYPE,
+            )
+
+        widths = (observation_size, *hidden_units)
+        self.hidden = [
+            dense(f"hidden_{i}", inputs, units, activation)
+            for i, (inputs, units) in enumerate(pairwise(widths))
+        ]
+        self.head = dense("head", widths[-1], action_count, None)
+        self.build((None, observation_size))
+
+    def build(self, input_shape: tuple[int | None, int]) -> None:
+        """Creates the weights, once. `input_shape` is (None, D)."""
+        for layer in (*self.hidden, self.head):
+            if not layer.built:
+                layer.build(input_shape)
+            input_shape = (None, layer.units)
+        self.built = True
+
+    def call(self, observation: Any) -> Any:
+        """Returns the Q-values [B, A] of observations [B, D]."""
+        features = observation
+        for layer in self.hidden:
+            features = layer(features)  # [B, units]
+        return self.head(features)
+
+    def clone(self) -> DQN:
+        """Returns a network with the same weights and its own variables."""
+        copy = DQN(
+            self.hidden_units,
+            self.action_count,
+            observation_size=self.observation_size,
+            activation=self.activation,
+            provenance=self.provenance,
+        )
+        copy.set_weights(self.get_weights())
+        return copy

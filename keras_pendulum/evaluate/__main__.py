@@ -1,0 +1,117 @@
+"""The command `python -m keras_pendulum.evaluate`."""
+
+# PYTHON_ARGCOMPLETE_OK
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.display import draw_without_display, require_display
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.errors import UserError
+from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
+from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+
+if TYPE_CHECKING:
+    from keras_pendulum.dqn.network import DQN
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command; returns its exit status."""
+    parser = OneLineParser(
+        prog="python -m keras_pendulum.evaluate",
+        description="Evaluate the policy in a weights file and compare it with the best possible "
+        "return.",
+    )
+    parser.add_argument(
+        "weights", metavar="WEIGHTS.h5", help="a file, or the name of a shipped one"
+    )
+    parser.add_argument(
+        "--episodes", type=int, default=100, metavar="N", help="number of episodes [100]"
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="seed of the first start; episode i starts from seed N + i [0]",
+    )
+    parser.add_argument(
+        "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--render", action="store_true", help="show the episodes in a window")
+    parser.add_argument(
+        "--gif", type=nonempty_path, metavar="FILE", help="save a film of the first episode"
+    )
+    arguments = parser.parse_args(argv)
+    return run_command(lambda: _evaluate(arguments))
+
+
+def _evaluate(arguments: argparse.Namespace) -> int:
+    require_tensorflow()
+    if arguments.gif:
+        require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
+    if arguments.render:
+        require_display()
+
+    with fast_import():
+        from keras_pendulum.evaluate.evaluation import evaluate_policy
+        from keras_pendulum.storage.weights import find_weights, load_weights
+
+    def require_open_window(env: Any) -> None:
+        if arguments.render and _window_closed():  # Gymnasium ignores a closed window
+            raise UserError("the window was closed before the end of the last episode")
+
+    path = find_weights(arguments.weights)
+    network = load_weights(path)
+    score = evaluate_policy(
+        network,
+        arguments.episodes,
+        arguments.seed,
+        gravity=arguments.gravity,
+        render_mode="human" if arguments.render else None,
+        on_step=require_open_window,
+    )
+    if arguments.gif:
+        _film(network, arguments.seed, score.gravity, arguments.gif)
+    if arguments.json:
+        print(json.dumps({"weights": str(path), **score.as_json()}))
+    else:
+        print(score.summary())
+    return 0
+
+
+def _window_closed() -> bool:
+    """Returns whether the user has closed the window since the last call."""
+    import pygame
+
+    return bool(pygame.event.get(pygame.QUIT))
+
+
+def _film(network: DQN, seed: int, gravity: float | None, path: str) -> None:
+    """Writes a GIF of the first episode in real time, with ten frames per second."""
+    from keras_pendulum.evaluate.evaluation import evaluate_policy
+    from keras_pendulum.evaluate.film import encode_gif
+
+    draw_without_display()
+    frames: list[Any] = []
+    evaluate_policy(
+        network,
+        1,
+        seed,
+        gravity=gravity,
+        render_mode="rgb_array",
+        on_step=lambda env: frames.append(env.render()),
+    )
+    interval = round(0.1 / TASKS[network.provenance.environment].seconds_per_step)
+    write_atomically(path, encode_gif(frames[::interval], seconds_per_frame=0.1))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

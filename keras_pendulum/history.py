@@ -1,0 +1,33 @@
+"""The record of a training episode, and its row in history.csv."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class EpisodeRecord(NamedTuple):
+    """The results of one training episode."""
+
+    episode: int  # from 0
+    average_reward: float  # per step
+    episode_return: float  # undiscounted sum of the rewards; "return" in history.csv
+    epsilon: float  # at the last step
+    loss: float  # mean over the updates of the episode; NaN without updates
+    environment_steps: int  # since the start of the run
+    updates: int  # since the start of the run
+    seconds: float  # wall-clock time of the episode and its updates
+
+    def line(self) -> str:
+        """Returns the line that the original prints."""
+        return (
+            f"Episode: {self.episode}, Average Reward: {self.average_reward:.3f}, "
+            f"Epsilon: {self.epsilon:.2f}"
+        )
+
+    def csv_row(self) -> str:
+        """Returns the row of history.csv; a NaN is an empty cell, as pandas expects."""
+        return ",".join("" if math.isnan(value) else repr(value) for value in self)
+
+
+CSV_HEADER = ",".join(EpisodeRecord._fields).replace("episode_return", "return")

@@ -1,1 +1,0 @@
-"""The best possible returns that `keras_pendulum.optimum` made and reads."""

@@ -1,0 +1,78 @@
+"""The command `python -m keras_pendulum.page`: writes a page that runs in a browser."""
+
+# PYTHON_ARGCOMPLETE_OK
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import webbrowser
+from collections.abc import Sequence
+from pathlib import Path
+
+from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.errors import UserError
+from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
+from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+
+_HEAD = b"<!doctype html>\n<!-- keras_pendulum page:"  # the first bytes of every page
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Writes the page as the command line says; returns the exit status."""
+    parser = OneLineParser(
+        prog="python -m keras_pendulum.page",
+        description="Write a page that runs in a browser and shows the network of a weights file.",
+    )
+    parser.add_argument(
+        "weights", metavar="WEIGHTS.h5", help="a file, or the name of a shipped one"
+    )
+    parser.add_argument(
+        "--out",
+        type=nonempty_path,
+        default="pendulum.html",
+        metavar="FILE",
+        help="file of the page [pendulum.html]",
+    )
+    parser.add_argument(
+        "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+    arguments = parser.parse_args(argv)
+    return run_command(lambda: _write(arguments))
+
+
+def _write(arguments: argparse.Namespace) -> int:
+    require_tensorflow()
+    out = Path(arguments.out)
+    require_no_other_file(out, _HEAD, "a page of this command")
+    if arguments.open:
+        _require_browser()
+
+    with fast_import():
+        from keras_pendulum.page.build import build_page
+        from keras_pendulum.storage.weights import find_weights, load_weights
+
+    path = find_weights(arguments.weights)
+    page = build_page(load_weights(path), path, arguments.gravity)
+    write_atomically(out, page)
+    address = out.resolve().as_uri()
+    print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")
+    if arguments.open and not webbrowser.open(address):
+        raise UserError(f"the browser did not start: open {out} yourself")
+    return 0
+
+
+def _require_browser() -> None:
+    screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    if sys.platform == "linux" and not any(map(os.environ.get, screens)):
+        # A text browser cannot run this page.
+        raise UserError("there is no display for a browser: leave out --open")
+    try:
+        webbrowser.get()
+    except webbrowser.Error as error:
+        raise UserError("there is no browser: leave out --open") from error
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+"use strict";
+
+/** The Q-network of the weights file: Dense layers, then one linear output for each torque. */
+class Network {
+  /**
+   * @param {{sizes: number[], activation: string, weights: string}} recorded sizes of all
+   *   layers, the observation's 3 first; weights as base64 of float32: kernel [in, out] and bias
+   *   [out] of each layer in order.
+   */
+  constructor({ sizes, activation, weights }) {
+    const numbers = Network.#decoded(weights);
+    const expected = sizes.slice(1).reduce((sum, units, i) => sum + (sizes[i] + 1) * units, 0);
+    if (numbers.length !== expected) {
+      throw new Error(`it contains ${numbers.length} weights; expected ${expected}`);
+    }
+    let start = 0;
+    const taken = (count) => numbers.subarray(start, (start += count));
+    this.layers = sizes.slice(1).map((units, i) => ({
+      kernel: taken(sizes[i] * units),
+      bias: taken(units),
+      activate: i === sizes.length - 2 ? (x) => x : Network.#ACTIVATIONS[activation],
+      sums: new Float64Array(units),
+      output: new Float32Array(units),
+    }));
+    // Like NumPy's linspace: the last torque is exact.
+    const count = sizes.at(-1);
+    const step = (2 * MAX_TORQUE) / (count - 1);
+    this.torques = Array.from({ length: count }, (_, i) => i * step - MAX_TORQUE); // N·m
+    this.torques[count - 1] = MAX_TORQUE;
+  }
+
+  static #ACTIVATIONS = { tanh: Math.tanh, relu: (x) => (x > 0 ? x : 0) };
+
+  static #decoded(text) {
+    const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+    return new Float32Array(bytes.buffer); // little-endian, like every machine with a browser
+  }
+
+  /** Returns the Q-values [A] of an observation [3]; the next call overwrites the array. */
+  qValues(observation) {
+    let features = observation;
+    for (const { kernel, bias, activate, sums, output } of this.layers) {
+      const units = sums.length;
+      sums.set(bias);
+      let i = 0;
+      // Four inputs at a time take half the time of single ones, because `sums` is accessed less often.
+      for (; i + 4 <= features.length; i += 4) {
+        const [a, b, c, d] = [features[i], features[i + 1], features[i + 2], features[i + 3]];
+        for (let j = 0, k = i * units; j < units; j++, k++) {
+          sums[j] +=
+            a * kernel[k] + b * kernel[k + units] + c * kernel[k + 2 * units] + d * kernel[k + 3 * units];
+        }
+      }
+      for (; i < features.length; i++) {
+        for (let j = 0, k = i * units; j < units; j++, k++) sums[j] += features[i] * kernel[k];
+      }
+      for (let j = 0; j < units; j++) {
+        output[j] = activate(Math.fround(sums[j]));
+      }
+      features = output;
+    }
+    return features;
+  }
+}
+
+/** Returns the index of the highest value, the lowest index among equal ones. */
+function argmax(values) {
+  let best = 0;
+  for (let i = 1; i < values.length; i++) {
+    if (values[i] > values[best]) best = i;
+  }
+  return best;
+}

@@ -1,0 +1,206 @@
+"use strict";
+
+const recorded = JSON.parse(document.getElementById("network").textContent);
+const element = (id) => document.getElementById(id);
+const calm = matchMedia("(prefers-reduced-motion: reduce)");
+const TRAIL = 12; // steps
+
+/** Returns the text below the title. */
+function about({ name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn }) {
+  const from = preset && !name.startsWith(`${preset}.`) ? ` (preset ${preset})` : "";
+  const sentences = [
+    `${name}${from}, a ${sizes.slice(1, -1).join("-")} ${activation} network with ` +
+      `${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
+  ];
+  const elsewhere = trainedGravity !== null && trainedGravity !== gravity;
+  if (elsewhere) sentences.push(`It was trained at g = ${trainedGravity} m/s².`);
+  if (evaluatedReturn !== null) {
+    const where = elsewhere ? " there" : "";
+    sentences.push(`Mean return when evaluated${where}: ${shown(evaluatedReturn, 2)}.`);
+  }
+  return sentences.join(" ");
+}
+
+class Page {
+  constructor(network) {
+    this.episode = new Episode(network, recorded.gravity);
+    this.map = new TorqueMap(network);
+    // 41 torques are multiples of 0.1 N·m; other counts may need a second digit.
+    this.digits = network.torques.every((u) => Math.abs(u * 10 - Math.round(u * 10)) < 1e-9) ? 1 : 2;
+    this.running = !calm.matches;
+    this.waiting = 0; // s since the last step
+    this.changed = true; // whether anything but `waiting` has changed since the last frame
+    this.recolour();
+    this.listen();
+    this.updateControls();
+    requestAnimationFrame((now) => this.frame(now, now));
+  }
+
+  /** Takes the steps that are due, 20 per second, and draws. */
+  frame(now, before) {
+    requestAnimationFrame((later) => this.frame(later, now));
+    if (this.running) {
+      // Limited, so that a tab that was hidden does not rush through the missed steps.
+      this.waiting = Math.min(this.waiting + (now - before) / 1000, 4 * TIME_STEP);
+      for (; this.waiting >= TIME_STEP; this.waiting -= TIME_STEP) this.step();
+    }
+    if (this.changed || (this.running && !calm.matches)) this.drawSwing();
+    if (this.map.work(8)) {
+      this.picture = null;
+      this.changed = true;
+    }
+    if (this.changed) this.drawRest();
+    this.changed = false;
+  }
+
+  /** Takes the next time step; after the last one, starts a new episode. */
+  step() {
+    if (this.episode.over) this.episode.reset();
+    else this.episode.step();
+    this.changed = true;
+  }
+
+  restart(theta, thetadot) {
+    this.episode.reset(theta, thetadot);
+    this.waiting = 0;
+    this.changed = true;
+  }
+
+  pause(running = !this.running) {
+    this.running = running;
+    this.waiting = 0;
+    this.changed = true;
+    this.updateControls();
+  }
+
+  drive(youDrive) {
+    if (youDrive && !this.episode.youDrive) this.episode.yourTorque = 0;
+    this.episode.youDrive = youDrive;
+    this.changed = true;
+    this.updateControls();
+  }
+
+  choose(torque) {
+    this.drive(true);
+    this.episode.yourTorque = torque;
+    this.updateControls();
+  }
+
+  recolour() {
+    this.colours = readColours();
+    this.picture = null;
+    this.changed = true;
+  }
+
+  /** Updates the buttons and the status line. */
+  updateControls() {
+    const { youDrive, yourTorque } = this.episode;
+    element("take-over").setAttribute("aria-checked", youDrive);
+    for (const button of document.querySelectorAll("[data-torque]")) {
+      const pressed = youDrive && Number(button.dataset.torque) === yourTorque;
+      button.setAttribute("aria-pressed", pressed);
+    }
+    element("pause").firstElementChild.textContent = this.running ? "Pause" : "Play";
+    const driver = youDrive ? "You drive." : "The network drives.";
+    element("status").textContent = this.running ? driver : `Paused. ${driver}`;
+  }
+
+  drawSwing() {
+    const { path, torque } = this.episode;
+    const angles = path.slice(-TRAIL - 1).map(([theta]) => theta);
+    // The drawing is one step behind: it moves from the previous state to the present one.
+    let theta = angles.at(-1);
+    if (this.running && !calm.matches && angles.length > 1) {
+      const share = this.waiting / TIME_STEP;
+      theta = angles.at(-2) + share * (theta - angles.at(-2));
+    }
+    const trail = calm.matches ? [] : [...angles.slice(0, -1), theta];
+    drawPendulum(element("pendulum"), this.colours, theta, torque, trail);
+  }
+
+  drawRest() {
+    const { episode, colours } = this;
+    const { torques } = episode.network;
+    element("torque").textContent = shown(episode.torque, this.digits, true);
+    element("reward").textContent = shown(episode.reward, 2);
+    element("return").textContent = shown(episode.return, 1);
+    element("step").textContent = `${episode.steps}/${EPISODE_STEPS}`;
+    element("theta").textContent = shown(wrapped(episode.theta), 2, true);
+    element("thetadot").textContent = shown(episode.thetadot, 2, true);
+    if (episode.last) {
+      element("last-return").textContent = shown(episode.last.return, 1);
+      element("last-driver").textContent = `by ${episode.last.driver}`;
+    }
+    const { qValues, best, youDrive, yourTorque } = episode;
+    element("best").textContent = `${shown(torques[best], this.digits, true)} N·m`;
+    drawBars(element("bars"), colours, torques, qValues, best, youDrive ? yourTorque : torques[best]);
+    this.picture ??= mapPicture(this.map, colours);
+    drawPortrait(element("portrait"), colours, this.picture, episode.path);
+  }
+
+  listen() {
+    const click = (button, act) =>
+      button.addEventListener("click", (event) => {
+        act();
+        // After a click, Space pauses again instead of pressing this button.
+        if (event.detail) button.blur();
+      });
+    click(element("take-over"), () => this.drive(!this.episode.youDrive));
+    click(element("pause"), () => this.pause());
+    click(element("one-step"), () => this.oneStep());
+    click(element("restart"), () => this.restart());
+    for (const button of document.querySelectorAll("[data-torque]")) {
+      const act = () => this.choose(Number(button.dataset.torque));
+      button.addEventListener("pointerdown", act); // when the finger touches, not when it leaves
+      click(button, act);
+    }
+    addEventListener("keydown", (event) => this.key(event));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
+    calm.addEventListener("change", () => this.pause(!calm.matches));
+    const sizes = new ResizeObserver(() => (this.changed = true));
+    document.querySelectorAll("canvas").forEach((canvas) => sizes.observe(canvas));
+  }
+
+  oneStep() {
+    this.pause(false);
+    this.step();
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const key = event.key.toLowerCase();
+    const torque = { j: -2, arrowleft: -2, k: 0, l: 2, arrowright: 2 }[key];
+    const upOrDown = key === "arrowup" || key === "arrowdown";
+    if (torque !== undefined) this.choose(torque);
+    // Up and down scroll the page unless you drive.
+    else if (upOrDown && this.episode.youDrive) this.choose(0);
+    else if (key === " " && event.target.localName !== "button" && !event.repeat) this.pause();
+    else if (key === "s") this.oneStep();
+    else if (key === "r" && !event.repeat) this.restart();
+    else if (key === "t" && !event.repeat) this.drive(!this.episode.youDrive);
+    else return;
+    event.preventDefault();
+  }
+}
+
+try {
+  if (!recorded) throw new Error("it contains no network");
+  element("about").textContent = about(recorded);
+  document.title = `Inverted pendulum: ${recorded.name}`;
+  const page = new Page(new Network(recorded));
+  /** Access to the page from the console and from tests. */
+  window.pendulum = {
+    page,
+    reset: (theta, thetadot) => page.restart(theta, thetadot),
+    step: () => page.step(),
+    qValues: (observation) => Array.from(page.episode.network.qValues(observation)),
+    state: () => {
+      const { network, last, path, drivers, ...rest } = page.episode;
+      return { ...rest, qValues: Array.from(rest.qValues), over: page.episode.over };
+    },
+  };
+} catch (error) {
+  element("problem").textContent =
+    `This page is damaged (${error.message}): write it again with python -m keras_pendulum.page.`;
+  element("problem").hidden = false;
+}

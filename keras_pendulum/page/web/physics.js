@@ -1,0 +1,137 @@
+"use strict";
+
+// Gymnasium's Pendulum-v1 with the same operations in the same order: m = 1 kg, l = 1 m.
+const TIME_STEP = 0.05; // s
+const MAX_SPEED = 8; // rad/s
+const MAX_TORQUE = 2; // N·m
+const EPISODE_STEPS = 200;
+
+/** Returns θ within -π and π. JavaScript's % has the sign of the dividend, NumPy's of the divisor. */
+function wrapped(theta) {
+  const turn = 2 * Math.PI;
+  const rest = (theta + Math.PI) % turn;
+  return (rest < 0 ? rest + turn : rest) - Math.PI;
+}
+
+function uniform(limit) {
+  return (2 * Math.random() - 1) * limit;
+}
+
+function clipped(value, limit) {
+  return Math.min(Math.max(value, -limit), limit);
+}
+
+/** Returns the observation: cos θ, sin θ, θ̇ in rad/s. */
+function observed(theta, thetadot) {
+  return Float32Array.of(Math.cos(theta), Math.sin(theta), thetadot);
+}
+
+/** A series of episodes, driven by the network or by the user. */
+class Episode {
+  constructor(network, gravity) {
+    this.network = network;
+    this.gravity = gravity; // m/s²
+    this.youDrive = false;
+    this.yourTorque = 0; // N·m, acts until the user chooses another
+    this.last = null; // {return, driver} of the last finished episode
+    this.reset();
+  }
+
+  /** Starts an episode, by default at random like Gymnasium; θ in rad, 0 upright; θ̇ in rad/s. */
+  reset(theta = uniform(Math.PI), thetadot = uniform(1)) {
+    this.theta = theta;
+    this.thetadot = thetadot;
+    this.torque = 0; // of the last step, N·m
+    this.reward = 0; // of the last step
+    this.return = 0;
+    this.steps = 0;
+    this.path = [[theta, thetadot]];
+    this.drivers = new Set();
+    this.#observe();
+  }
+
+  get over() {
+    return this.steps >= EPISODE_STEPS;
+  }
+
+  /** Takes one time step of 0.05 s with the torque of the driver. */
+  step() {
+    const { theta, thetadot } = this;
+    const torque = this.youDrive ? this.yourTorque : this.network.torques[this.best];
+    const cost = wrapped(theta) ** 2 + 0.1 * thetadot ** 2 + 0.001 * torque ** 2;
+    const acceleration = ((3 * this.gravity) / 2) * Math.sin(theta) + 3 * torque;
+    this.thetadot = clipped(thetadot + acceleration * TIME_STEP, MAX_SPEED);
+    this.theta = theta + this.thetadot * TIME_STEP;
+    this.torque = torque;
+    this.reward = -cost;
+    this.return -= cost;
+    this.steps += 1;
+    this.path.push([this.theta, this.thetadot]);
+    this.drivers.add(this.youDrive ? "you" : "network");
+    if (this.steps === EPISODE_STEPS) {
+      this.last = { return: this.return, driver: this.drivers.size > 1 ? "both" : [...this.drivers][0] };
+    }
+    this.#observe();
+  }
+
+  #observe() {
+    this.qValues = this.network.qValues(observed(this.theta, this.thetadot)).slice();
+    this.best = argmax(this.qValues);
+  }
+}
+
+/** The greedy torque over the phase plane, computed in small portions, coarse cells first. */
+class TorqueMap {
+  constructor(network, size = 97) {
+    this.network = network;
+    this.size = size; // θ from -π to π by columns, θ̇ from 8 to -8 by rows, ends included
+    this.torques = new Float32Array(size * size);
+    this.ready = false;
+    this.#cells = this.#coarseToFine();
+  }
+
+  #cells;
+
+  theta(column) {
+    return (2 * column / (this.size - 1) - 1) * Math.PI;
+  }
+
+  thetadot(row) {
+    return (1 - 2 * row / (this.size - 1)) * MAX_SPEED;
+  }
+
+  /** Computes for about `milliseconds`; returns whether the map has changed. */
+  work(milliseconds) {
+    if (this.ready) return false;
+    const end = performance.now() + milliseconds;
+    do {
+      const { value, done } = this.#cells.next();
+      if (done) {
+        this.ready = true;
+        break;
+      }
+      const [row, column, width] = value;
+      const torque = this.greedyTorque(this.theta(column), this.thetadot(row));
+      for (let i = row; i < Math.min(row + width, this.size); i++) {
+        const j = i * this.size + column;
+        this.torques.fill(torque, j, Math.min(j + width, (i + 1) * this.size));
+      }
+    } while (performance.now() < end);
+    return true;
+  }
+
+  greedyTorque(theta, thetadot) {
+    return this.network.torques[argmax(this.network.qValues(observed(theta, thetadot)))];
+  }
+
+  *#coarseToFine() {
+    for (const width of [16, 8, 4, 2, 1]) {
+      for (let row = 0; row < this.size; row += width) {
+        for (let column = 0; column < this.size; column += width) {
+          const computed = width < 16 && row % (2 * width) === 0 && column % (2 * width) === 0;
+          if (!computed) yield [row, column, width];
+        }
+      }
+    }
+  }
+}

@@ -1,0 +1,110 @@
+"""The command `python -m keras_pendulum.play`."""
+
+# PYTHON_ARGCOMPLETE_OK
+from __future__ import annotations
+
+import argparse
+import functools
+import random
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from keras_pendulum.cli import ControlC, OneLineParser, nonempty_path, run_command
+from keras_pendulum.config.config import Config, validate_setting
+from keras_pendulum.display import require_display
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.errors import UserError
+from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from keras_pendulum.play.episode import Policy
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Plays the game as the command line says; returns the exit status."""
+    parser = OneLineParser(
+        prog="python -m keras_pendulum.play",
+        description="Drive the pendulum by hand; --against then shows a policy on the same start.",
+        epilog="Keys: j or left -2 N·m, l or right +2, k or down 0; r restarts, ESC leaves.",
+    )
+    parser.add_argument(
+        "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
+    )
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the first start [random]")
+    parser.add_argument(
+        "--against",
+        type=nonempty_path,
+        metavar="WEIGHTS.h5",
+        help="a file, or the name of a shipped one: its policy drives after you",
+    )
+    parser.add_argument(
+        "--print-steps", action="store_true", help="print a line for each of your steps"
+    )
+    arguments = parser.parse_args(argv)
+    return run_command(lambda: _play(arguments))
+
+
+def _play(arguments: argparse.Namespace) -> int:
+    gravity, seed = arguments.gravity, arguments.seed
+    if gravity is not None:
+        gravity = validate_setting("gravity", gravity)
+    if seed is not None:
+        seed = validate_setting("seed", seed)
+    require_display()
+    agent = None
+    if arguments.against is not None:
+        agent, gravity = _load_agent(arguments.against, gravity)
+    elif gravity is None:
+        gravity = Config.gravity
+    return _run_game(gravity, seed, agent, arguments.print_steps)
+
+
+def _load_agent(weights: str, gravity: float | None) -> tuple[Policy, float]:
+    """Returns the greedy policy of a weights file, and the gravity to play at (m/s²)."""
+    require_tensorflow()
+    with fast_import():
+        from keras_pendulum.evaluate.evaluation import evaluation_gravity
+        from keras_pendulum.storage.weights import find_weights, load_weights
+
+    from keras_pendulum.dqn.policy import greedy_policy
+    from keras_pendulum.environments.actions import TorqueGrid
+
+    path = find_weights(weights)
+    network = load_weights(path)
+    provenance = network.provenance
+    if not TASKS[provenance.environment].has_torque:
+        raise UserError(f"{path}: belongs to {provenance.environment}; expected Pendulum-v1")
+    gravity = evaluation_gravity(provenance, gravity)
+    assert gravity is not None  # only CartPole has none
+    policy, torques = greedy_policy(network), TorqueGrid(network.action_count)
+
+    def choose_torque(observation: NDArray[np.float32]) -> float:
+        return float(torques.to_env_action(policy.action(observation))[0])
+
+    return choose_torque, gravity
+
+
+def _run_game(gravity: float, seed: int | None, agent: Policy | None, print_steps: bool) -> int:
+    from keras_pendulum.optimum.optimal_return import USUAL_SEEDS
+    from keras_pendulum.play.game import Game
+    from keras_pendulum.play.window import Window, play
+
+    if seed is None:
+        # The optimal returns of these seeds are shipped, or cached after their first use.
+        seed = random.choice(USUAL_SEEDS)
+    print_line = functools.partial(print, flush=True)
+    game = Game(gravity, seed, agent, print_line=print_line, print_steps=print_steps)
+    try:
+        with ControlC() as control_c:
+            play(game, Window(), control_c.check)
+    finally:
+        game.close()  # closes the window too
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

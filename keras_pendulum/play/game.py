@@ -1,0 +1,210 @@
+"""The game: the player drives the pendulum, then a policy drives it from the same start.
+
+A `Game` has no window and no clock. Its caller passes it the pressed keys, calls `advance` once per
+frame, and draws its `view`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.environments.actions import MAX_TORQUE
+from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environment
+from keras_pendulum.optimum.optimal_return import USUAL_SEEDS, optimal_return
+from keras_pendulum.play.episode import ManualEpisode, Policy
+
+FRAMES_PER_SECOND = 20  # a step of the environment is 0.05 s
+READY_FRAMES = 2 * FRAMES_PER_SECOND  # the player sees the start before the pendulum moves
+
+
+class Key(Enum):
+    """The meaning of a key."""
+
+    CLOCKWISE = auto()
+    COUNTERCLOCKWISE = auto()
+    NO_TORQUE = auto()
+    RESTART = auto()
+    CONTINUE = auto()
+    LEAVE = auto()
+
+
+TORQUES = {Key.CLOCKWISE: -MAX_TORQUE, Key.COUNTERCLOCKWISE: MAX_TORQUE, Key.NO_TORQUE: 0.0}  # N·m
+
+
+@dataclass(frozen=True)
+class View:
+    """The content of one frame."""
+
+    title: str
+    gravity: float  # m/s²
+    seed: int
+    torque: float  # N·m, of the last step
+    step: int
+    reward: float  # of the last step
+    total_reward: float  # the return so far
+    optimal_return: float
+    message: str  # over the picture; empty while the pendulum moves
+    key_help: str
+    pixels: NDArray[np.uint8]  # [500, 500, 3], Gymnasium's picture
+
+
+class _Stage(Enum):
+    READY = auto()  # the window shows the start
+    PLAYER = auto()
+    AGENT = auto()
+    SCORE = auto()
+
+
+_TITLES = {
+    _Stage.READY: "You drive",
+    _Stage.PLAYER: "You drive",
+    _Stage.AGENT: "The agent drives",
+    _Stage.SCORE: "The score",
+}
+_KEY_HELP = {
+    _Stage.READY: "Press j, k, l or Enter to start, or wait 2 seconds",
+    _Stage.PLAYER: "r  same start again     ESC  leave",
+    _Stage.AGENT: "Enter  skip to the score     r  drive again     ESC  leave",
+    _Stage.SCORE: "r  same start again     Enter  next start     ESC  leave",
+}
+
+
+class Game:
+    """A series of episodes that ends when the player leaves.
+
+    The player drives first. Then the agent, if any, drives from the same start. Then the game
+    prints the score.
+
+    The constructor takes some 20 s if the optimal return of the first start is not stored yet.
+
+    Args:
+        gravity: m/s².
+        seed: of the first start.
+        agent: the policy that drives after the player, or None.
+        print_line: called with each line of output.
+        print_steps: print a line for each step of the player.
+    """
+
+    def __init__(
+        self,
+        gravity: float,
+        seed: int,
+        agent: Policy | None = None,
+        *,
+        print_line: Callable[[str], None] = print,
+        print_steps: bool = False,
+    ) -> None:
+        self._gravity, self._agent, self._print_line = gravity, agent, print_line
+        self._print_steps = print_steps
+        self._env = make_environment("Pendulum-v1", gravity, render_mode="rgb_array")
+        self.finished = False
+        self._stage = _Stage.READY
+        self._start(seed)
+
+    def press(self, key: Key) -> None:
+        """Applies a key press."""
+        stage = self._stage
+        if key is Key.LEAVE:
+            self._leave()
+        elif key is Key.RESTART:
+            self._restart()
+        elif key in TORQUES and stage in (_Stage.READY, _Stage.PLAYER):
+            self._torque = TORQUES[key]
+            self._stage = _Stage.PLAYER
+        elif key is Key.CONTINUE and stage is _Stage.READY:
+            self._stage = _Stage.PLAYER
+        elif key is Key.CONTINUE and stage is _Stage.AGENT:
+            while self._stage is _Stage.AGENT:
+                self._step_agent()
+        elif key is Key.CONTINUE and stage is _Stage.SCORE:
+            # Stays within the seeds whose optimal returns are stored together.
+            self._start((self._seed + 1) % len(USUAL_SEEDS))
+
+    def advance(self) -> None:
+        """Advances by one frame; the player or the agent takes one step."""
+        if self._stage is _Stage.READY:
+            self._frames_left -= 1
+            if self._frames_left == 0:
+                self._stage = _Stage.PLAYER
+        elif self._stage is _Stage.PLAYER:
+            self._step_player()
+        elif self._stage is _Stage.AGENT:
+            self._step_agent()
+
+    def view(self) -> View:
+        """Returns the content of the present frame."""
+        message = {_Stage.READY: "Get ready!", _Stage.SCORE: self._score()}.get(self._stage, "")
+        pixels: Any = self._env.render()
+        episode = self._episode
+        return View(
+            title=_TITLES[self._stage],
+            gravity=self._gravity,
+            seed=self._seed,
+            torque=episode.torque,
+            step=episode.steps,
+            reward=episode.reward,
+            total_reward=episode.total_reward,
+            optimal_return=self._optimal_return,
+            message=message,
+            key_help=_KEY_HELP[self._stage],
+            pixels=pixels,
+        )
+
+    def close(self) -> None:
+        """Closes the environment; Gymnasium then closes all windows of pygame."""
+        self._env.close()
+
+    def _start(self, seed: int) -> None:
+        self._seed = seed
+        self._optimal_return = float(optimal_return(self._gravity, [seed])[0])
+        self._print_line(f"Start: seed {seed}, g = {self._gravity:g}")
+        self._restart()
+
+    def _restart(self) -> None:
+        # The episode on the screen is the player's until the agent drives.
+        self._player = self._episode = ManualEpisode(self._env, self._seed)
+        self._torque = 0.0
+        self._stage = _Stage.READY
+        self._frames_left = READY_FRAMES
+
+    def _step_player(self) -> None:
+        self._player.step(self._torque)
+        if self._print_steps:
+            self._print_line(str(self._player))
+        if self._player.done:
+            if self._agent is None:
+                self._show_score()
+            else:
+                self._episode = ManualEpisode(self._env, self._seed)
+                self._stage = _Stage.AGENT
+
+    def _step_agent(self) -> None:
+        assert self._agent is not None
+        self._episode.step(self._agent(self._episode.observation))
+        if self._episode.done:
+            self._show_score()
+
+    def _show_score(self) -> None:
+        self._stage = _Stage.SCORE
+        self._print_line(self._score())
+
+    def _leave(self) -> None:
+        if self._stage is not _Stage.SCORE:
+            self._print_line(self._score())
+        self.finished = True
+
+    def _score(self) -> str:
+        """Returns the returns of the finished episodes, or the player's return so far."""
+        player = f"you {self._player.total_reward:.1f}"
+        if not self._player.done:
+            return f"{player} after {self._player.steps} of {STEPS_PER_EPISODE} steps"
+        parts = [player]
+        if self._episode is not self._player and self._episode.done:
+            parts.append(f"agent {self._episode.total_reward:.1f}")
+        return " · ".join([*parts, f"best possible {self._optimal_return:.1f}"])

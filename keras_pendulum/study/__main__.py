@@ -1,0 +1,205 @@
+"""The command `python -m keras_pendulum.study`."""
+
+# PYTHON_ARGCOMPLETE_OK
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.errors import UserError
+from keras_pendulum.study.arms import Arm, default_arms, own_arms
+from keras_pendulum.tensorflow_setup import require_tensorflow
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    from keras_pendulum.study.job import Job
+    from keras_pendulum.study.results_folder import ResultsFolder
+    from keras_pendulum.study.runner import FinishedJob
+
+_MAX_SEEDS = 100_000
+_MAX_WORKERS = 512
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Parses the command line and makes the study; returns the exit status."""
+    parser = OneLineParser(
+        prog="python -m keras_pendulum.study",
+        description="Train variants of the agent with many seeds, and compare their regrets with "
+        "confidence intervals. Without --presets and --arm: from `original` to `reference` one "
+        "change at a time, `reference` without each change, and with index-truncation.",
+        epilog="Ctrl-C stops. Run the same command again to continue, or with more seeds to extend "
+        "the study.",
+    )
+    parser.add_argument(
+        "--presets", type=_preset_names, default=[], metavar="A,B,…", help="these presets as arms"
+    )
+    parser.add_argument(
+        "--arm",
+        action="append",
+        default=[],
+        metavar="'NAME: PRESET field=value …'",
+        help="an arm: a preset with some settings changed; may be repeated",
+    )
+    parser.add_argument(
+        "--seeds", type=int, default=10, metavar="N", help="runs of each arm: seeds 0 to N-1 [10]"
+    )
+    parser.add_argument(
+        "--out", type=nonempty_path, metavar="DIR", help="folder of the study [studies/ARMS]"
+    )
+    place = parser.add_mutually_exclusive_group()
+    place.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="worker processes on this machine [one per core]",
+    )
+    place.add_argument(
+        "--scheduler",
+        type=nonempty_path,
+        metavar="ADDRESS",
+        help="use the workers of this Dask scheduler, such as tcp://10.0.0.1:8786",
+    )
+    arguments = parser.parse_args(argv)
+    return run_command(lambda: _study(arguments))
+
+
+def _study(arguments: argparse.Namespace) -> int:
+    _require_range("--seeds", arguments.seeds, _MAX_SEEDS)
+    if arguments.workers is not None:
+        _require_range("--workers", arguments.workers, _MAX_WORKERS)
+    chosen = bool(arguments.presets or arguments.arm)
+    arms = own_arms(arguments.presets, arguments.arm) if chosen else default_arms()
+    require_tensorflow()
+    for package in ("scipy", "distributed"):
+        if importlib.util.find_spec(package) is None:
+            raise UserError(f'{package} is not installed: pip install "keras_pendulum[study]"')
+
+    from keras_pendulum.study.results_folder import ResultsFolder
+
+    slugs = "-vs-".join(arm.slug for arm in arms) if chosen else "original-to-reference"
+    path = Path(arguments.out or Path("studies") / slugs[:100])
+    folder = ResultsFolder(path, arms, arguments.seeds)
+    folder.require_usable()
+    total = folder.job_count
+    failures: list[FinishedJob] = []
+    try:
+        missing = folder.missing_jobs()
+        if finished := total - len(missing):
+            print(f"{finished} of {total} runs are already finished", flush=True)
+        if missing:
+            failures = _make_runs(folder, missing, arguments)
+    except KeyboardInterrupt:
+        _print_problem(
+            f"Interrupted: {total - len(folder.missing_jobs())} of {total} runs are in "
+            f"{folder.path}; run the same command again to continue"
+        )
+        raise
+    _write_tables(folder, arms)
+    if failures:
+        reasons = "; ".join(f"{failure.job}: {failure.problem}" for failure in failures[:5])
+        more = f"; and {len(failures) - 5} more" if len(failures) > 5 else ""
+        _print_problem(
+            f"error: {len(failures)} of {total} runs failed ({reasons}{more}); run the same "
+            "command again to retry them"
+        )
+    return 1 if failures else 0
+
+
+def _workers(
+    arguments: argparse.Namespace, versions: dict[str, str], job_count: int
+) -> AbstractContextManager[Client]:
+    from keras_pendulum.study.dask_workers import cluster_workers, local_workers
+
+    if arguments.scheduler:
+        return cluster_workers(arguments.scheduler, versions)
+    return local_workers(min(arguments.workers or len(os.sched_getaffinity(0)), job_count))
+
+
+def _make_runs(
+    folder: ResultsFolder, jobs: Sequence[Job], arguments: argparse.Namespace
+) -> list[FinishedJob]:
+    """Makes the runs and prints a line for each; returns the failed ones."""
+    from keras_pendulum.study.dask_workers import dashboard
+    from keras_pendulum.study.job import train_and_score
+    from keras_pendulum.study.runner import run_all
+
+    total = folder.job_count
+    failures: list[FinishedJob] = []
+    training = evaluation = 0.0
+    made = 0
+    started = time.perf_counter()
+    with _workers(arguments, folder.versions, len(jobs)) as client, folder.create_and_lock():
+        if address := dashboard(client):
+            print(f"Dashboard: {address}", flush=True)
+        for finished in run_all(client, train_and_score, jobs, _print_problem):
+            job, reply, problem = finished
+            if reply is None:
+                failures.append(finished)
+                _print_problem(f"{job}: failed, {problem}")
+                continue
+            result = folder.save(job, reply)
+            made += 1
+            training += reply.training
+            evaluation += reply.evaluation
+            left = int((time.perf_counter() - started) * (len(jobs) - made) / made)
+            print(
+                f"{job}: regret {result.regret:.2f}, {reply.total:.1f} s, "
+                f"{total - len(jobs) + made}/{total}, {left // 60}:{left % 60:02} left",
+                flush=True,
+            )
+        workers = max(1, len(client.nthreads()))
+    if made:
+        seconds = time.perf_counter() - started
+        overhead = seconds * workers - training - evaluation
+        print(
+            f"{made} runs in {seconds:.0f} s, workers: {workers}, runs per core-hour: "
+            f"{3600 * made / (seconds * workers):.0f}; mean seconds per run: "
+            f"{training / made:.2f} training, {evaluation / made:.2f} evaluation, "
+            f"{overhead / made:.2f} overhead (start of the workers and wait for the last run "
+            "included)"
+        )
+    return failures
+
+
+def _write_tables(folder: ResultsFolder, arms: Sequence[Arm]) -> None:
+    from keras_pendulum.study import figure, table
+
+    results = folder.results()
+    rows = table.make_rows(arms, results)
+    if not rows:
+        return
+    files = {
+        "table.md": table.as_markdown(rows).encode(),
+        "table.csv": table.as_csv(rows).encode(),
+        "table.json": table.as_json(rows, folder.versions).encode(),
+        "figure.png": figure.draw_study(rows, results),
+    }
+    for name, content in files.items():
+        folder.write(name, content)
+    print(f"\n{files['table.md'].decode()}\nSaved in {folder.path}: {', '.join(files)}, results/")
+
+
+def _print_problem(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+def _require_range(flag: str, value: int, maximum: int) -> None:
+    if not 1 <= value <= maximum:
+        raise UserError(f"{flag} is {value}; expected a whole number from 1 to {maximum}")
+
+
+def _preset_names(text: str) -> list[str]:
+    return [nonempty_path(part.strip()) for part in text.split(",")]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,154 @@
+"""One run of a study, and its result as the bytes of a file: the same on every machine."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import time
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, NamedTuple
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.errors import UserError
+from keras_pendulum.tensorflow_setup import fast_import, use_one_thread
+from keras_pendulum.version import __version__
+
+EPISODES_PER_POINT = 10  # of a learning curve
+_DECIMALS = 6  # of a learning curve
+_EVALUATION_EPISODES = 100
+
+
+class Job(NamedTuple):
+    """A run of a study, as it is sent to a worker."""
+
+    arm: str
+    slug: str  # the arm's name in file names
+    config: Config  # with the run's seed
+    versions: dict[str, str]  # of the study's packages
+
+    def __str__(self) -> str:
+        return f"{self.arm}, seed {self.config.seed}"
+
+
+class RunResult(NamedTuple):
+    """The saved numbers of a run. They do not depend on when, where or how fast it was made."""
+
+    optimal_mean_return: float  # on the starts of seeds 0 to 99
+    returns: list[float]  # greedy, from the same starts
+    average_rewards: list[float]  # per step, while training; means over 10 episodes
+    episode_returns: list[float]  # while training; means over 10 episodes
+
+    @property
+    def regret(self) -> float:
+        """The mean optimal return minus the mean return."""
+        return self.optimal_mean_return - sum(self.returns) / len(self.returns)
+
+
+class Reply(NamedTuple):
+    """A worker's answer: the result as bytes, and its cost, which is not part of the result."""
+
+    result: bytes
+    training: float  # seconds
+    evaluation: float  # seconds
+    total: float  # seconds, including the import of TensorFlow in a worker's first run
+    worker: str  # host and process
+
+
+def train_and_score(job: Job) -> Reply:
+    """Trains, evaluates on the starts of seeds 0 to 99, and returns the result.
+
+    Raises UserError when the training diverges, or when this worker has other versions than the
+    study.
+    """
+    started = time.perf_counter()
+    worker = f"{platform.node()}:{os.getpid()}"
+    require_versions(job.versions, installed_versions(), f"the worker {worker}")
+    use_one_thread()
+    with fast_import():
+        from keras_pendulum.evaluate.evaluation import evaluate_policy
+        from keras_pendulum.train.train_dqn import train_dqn
+    imported = time.perf_counter()
+    training = train_dqn(job.config)
+    trained = time.perf_counter()
+    score = evaluate_policy(training.network, _EVALUATION_EPISODES)
+    evaluated = time.perf_counter()
+    result = RunResult(
+        optimal_mean_return=score.optimal_mean_return,
+        returns=score.returns.tolist(),
+        average_rewards=curve_points([record.average_reward for record in training.history]),
+        episode_returns=curve_points([record.episode_return for record in training.history]),
+    )
+    data = encode(job, result)
+    total = time.perf_counter() - started
+    return Reply(data, trained - imported, evaluated - trained, total, worker)
+
+
+def curve_points(values: list[float]) -> list[float]:
+    """Returns the mean of every 10 values; the last mean may have fewer."""
+    starts = range(0, len(values), EPISODES_PER_POINT)
+    blocks = [values[start : start + EPISODES_PER_POINT] for start in starts]
+    return [round(sum(block) / len(block), _DECIMALS) for block in blocks]
+
+
+def installed_versions() -> dict[str, str]:
+    """Returns the versions of the packages that a result depends on, without importing them."""
+    versions = {"keras_pendulum": __version__}
+    for name in ("tensorflow", "keras", "gymnasium", "numpy"):
+        for package in (name, f"{name}-cpu"):
+            try:
+                versions[name] = version(package)
+                break
+            except PackageNotFoundError:
+                versions[name] = "missing"
+    return versions
+
+
+def require_versions(expected: Mapping[str, str], found: Mapping[str, str], who: str) -> None:
+    """Raises UserError, naming the first package that differs: results would not be comparable."""
+    for package, number in expected.items():
+        if found.get(package) != number:
+            raise UserError(
+                f"{who} has {package} {found.get(package, 'missing')}, this study has {number}: "
+                "use the same versions everywhere"
+            )
+
+
+def encode(job: Job, result: RunResult) -> bytes:
+    """Returns a small JSON file with its SHA-256; equal results have equal bytes."""
+    return _with_checksum({**_settings(job), "regret": result.regret, **result._asdict()})
+
+
+def decode(data: bytes, job: Job) -> RunResult | None:
+    """Returns the result that `encode` wrote for this job; None for damaged or other bytes."""
+    try:
+        content = json.loads(data)["result"]
+        settings = _settings(job)
+        if _with_checksum(content) != data:
+            return None
+        if {key: content[key] for key in settings} != settings:
+            return None
+        return RunResult(*(content[field] for field in RunResult._fields))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _settings(job: Job) -> dict[str, Any]:
+    """Returns everything that identifies the job, as JSON reads it back."""
+    config = dict(vars(job.config))  # `asdict` copies deeply, which takes ten times as long
+    config["hidden_units"] = list(config["hidden_units"])
+    return {
+        "arm": job.arm,
+        "seed": config.pop("seed"),
+        "config": config,
+        "versions": job.versions,
+        "episodes_per_point": EPISODES_PER_POINT,
+    }
+
+
+def _with_checksum(content: dict[str, Any]) -> bytes:
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False)
+    checksum = hashlib.sha256(text.encode()).hexdigest()
+    return f'{{"result": {text},\n"sha256": "{checksum}"}}\n'.encode()

@@ -1,0 +1,177 @@
+"""The command `python -m keras_pendulum.train`."""
+
+# PYTHON_ARGCOMPLETE_OK
+from __future__ import annotations
+
+import argparse
+import shlex
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.config.flags import add_config_flags, settings_from_args
+from keras_pendulum.config.presets import PRESETS, preset
+from keras_pendulum.display import require_display
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.errors import UserError
+from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.train.progress_bar import make_progress
+
+if TYPE_CHECKING:
+    from keras_pendulum.train.live_plot import LivePlot
+    from keras_pendulum.train.run_folder import RunFolder
+    from keras_pendulum.train.train_dqn import TrainingResult
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Trains as the command line says; returns the exit status."""
+    parser = OneLineParser(
+        prog="python -m keras_pendulum.train",
+        description="Train a DQN on the pendulum or on CartPole, and evaluate it.",
+        epilog="Ctrl-C saves a checkpoint; --resume continues from it.",
+    )
+    parser.add_argument("--preset", type=nonempty_path, help=f"{', '.join(PRESETS)} [reference]")
+    parser.add_argument(
+        "--init", type=nonempty_path, metavar="FILE.h5", help="start from these weights"
+    )
+    parser.add_argument(
+        "--out", type=nonempty_path, metavar="DIR", help="folder of the run [runs/PRESET-seedN]"
+    )
+    rerun = parser.add_mutually_exclusive_group()
+    rerun.add_argument(
+        "--resume", action="store_true", help="continue from the last checkpoint in DIR"
+    )
+    rerun.add_argument("--overwrite", action="store_true", help="replace the run in DIR")
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--live", action="store_true", help="draw the returns during the run")
+    shown.add_argument("--render", action="store_true", help="show the environment in a window")
+    parser.add_argument("--quiet", action="store_true", help="print only the closing lines")
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write DIR/tensorboard (extra `tensorboard`)"
+    )
+    add_config_flags(parser)
+    arguments = parser.parse_args(argv)
+    return run_command(lambda: _train(arguments))
+
+
+def _train(arguments: argparse.Namespace) -> int:
+    settings = settings_from_args(arguments)
+    config = preset(arguments.preset or "reference", **settings)
+    out = Path(arguments.out or Path("runs") / f"{config.preset}-seed{config.seed}")
+    if arguments.resume and arguments.init:
+        raise UserError("--init starts a new run, --resume continues one: give only one of them")
+    require_tensorflow()
+    if arguments.render:
+        require_display()
+    live = _live_plot() if arguments.live else None
+
+    with fast_import():
+        from keras_pendulum.storage.weights import find_weights, load_weights
+        from keras_pendulum.train.checkpoint import load_config
+        from keras_pendulum.train.run_folder import RunFolder
+        from keras_pendulum.train.tensorboard import TensorBoardLog
+        from keras_pendulum.train.train_dqn import train_dqn
+
+    if arguments.resume:
+        if arguments.preset:
+            settings["preset"] = arguments.preset
+        config = replace(load_config(RunFolder(out).weights), **settings)
+    init = load_weights(find_weights(arguments.init)) if arguments.init else None
+
+    folder = RunFolder(out, config.environment)
+    log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
+    progress = None if arguments.quiet else make_progress(config)
+    started = time.perf_counter()
+    with _Interrupt() as interrupt:
+        result = train_dqn(
+            config,
+            out,
+            init=init,
+            overwrite=arguments.overwrite,
+            resume=arguments.resume,
+            render=arguments.render,
+            listeners=[each for each in (progress, live, log) if each],
+            on_checkpoint=log.on_checkpoint if log else lambda network, episode: None,
+            should_stop=lambda: interrupt.asked,
+        )
+    if live:
+        live.finish()
+    if sys.stdout.isatty() and progress and not result.finished:
+        print()  # ends the line of the bar
+    _print_summary(result, folder, time.perf_counter() - started, score=not interrupt.asked)
+    return 130 if interrupt.asked else 0
+
+
+def _live_plot() -> LivePlot | None:
+    from keras_pendulum.train.live_plot import LivePlot
+
+    try:
+        return LivePlot()
+    except UserError as error:
+        print(f"no live plot: {error}; the training continues", file=sys.stderr)
+        return None
+
+
+class _Interrupt:
+    """The first Ctrl-C stops the run after its episode, with a checkpoint; the second at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+    def __enter__(self) -> _Interrupt:
+        # Also where SIGINT was ignored, so that `kill -INT` stops a run in the background.
+        self._before = signal.signal(signal.SIGINT, self._ask)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def _ask(self, signum: int, frame: object) -> None:
+        self.asked = True
+        signal.signal(signal.SIGINT, self._before)
+
+
+def _print_summary(
+    result: TrainingResult, folder: RunFolder, seconds: float, *, score: bool
+) -> None:
+    from keras_pendulum.evaluate.evaluation import evaluate_policy, random_return
+
+    last = result.history[-1]
+    state = "Trained" if result.finished else "Interrupted after"
+    print(
+        f"{state} {last.episode + 1} episodes ({last.environment_steps} steps, {last.updates} "
+        f"updates); this took {seconds:.1f} s."
+    )
+    if score:
+        greedy = evaluate_policy(result.network)
+        print(greedy.summary())
+        steps = TASKS[greedy.environment].steps_per_episode
+        random = random_return(greedy.environment, greedy.gravity, steps)
+        print(f"Uniformly random actions on the same starts: {random:.2f}")
+    saved = ", ".join(file.name for file in folder.files if file.exists())
+    print(f"Saved in {folder.path}: {saved}")
+    print(_next_commands(result, folder))
+
+
+def _next_commands(result: TrainingResult, folder: RunFolder) -> str:
+    weights = shlex.quote(str(folder.path / folder.weights.name))
+    if not result.finished:
+        commands = {"Continue": f"train --resume --out {shlex.quote(str(folder.path))}"}
+    elif TASKS[result.network.provenance.environment].has_torque:
+        commands = {
+            "Watch it": f"evaluate {weights} --episodes 3 --render",
+            "Play against it": f"play --against {weights}",
+            "Take it to a browser": f"page {weights}",
+        }
+    else:
+        commands = {"Watch it": f"evaluate {weights} --episodes 3 --render"}
+    return "\n".join(f"{what}: python -m keras_pendulum.{do}" for what, do in commands.items())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

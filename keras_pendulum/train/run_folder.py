@@ -1,0 +1,131 @@
+"""The folder of a run: its checkpoint, history, settings and picture."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.errors import UserError
+from keras_pendulum.history import CSV_HEADER, EpisodeRecord
+from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.storage.folder_lock import lock_folder
+
+
+class RunFolder:
+    """The files of a run.
+
+    Args:
+        path: the folder.
+        environment: of the run; None takes that of the checkpoint in the folder.
+
+    Raises UserError when the folder cannot be read, or when it holds the checkpoints of two
+    environments and `environment` is None.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], environment: str | None = None) -> None:
+        self.path = Path(path)
+        try:
+            # The real path: a link that changes during the run must not change the folder.
+            self._real_path = Path(os.path.realpath(path))
+            checkpoints = [self._real_path / task.weights_name for task in TASKS.values()]
+            existing = [file for file in checkpoints if file.exists()]
+        except OSError as error:
+            raise UserError(f"cannot read the folder {path}: {error.strerror}") from error
+        if environment is not None:
+            self.weights = self._real_path / TASKS[environment].weights_name
+        elif len(existing) > 1:
+            names = " and ".join(file.name for file in existing)
+            raise UserError(f"{path} holds {names}: move one of them to another folder")
+        else:
+            self.weights = (existing or checkpoints)[0]
+        self._other_checkpoints = [file for file in checkpoints if file != self.weights]
+        self.history = self._real_path / "history.csv"
+        self.config = self._real_path / "config.json"
+        self.picture = self._real_path / "rewards.png"
+        self.events = self._real_path / "tensorboard"
+        self.require_not_moved: Callable[[], None] = lambda: None  # see folder_lock.lock_folder
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that a finished run leaves in the folder."""
+        return [self.weights, self.history, self.config, self.picture]
+
+    def create(self) -> None:
+        """Creates the folder if it does not exist. Raises UserError when that fails."""
+        try:
+            self._real_path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
+
+    @contextlib.contextmanager
+    def lock(self) -> Iterator[None]:
+        """Locks the folder against other runs; the system releases the lock of a killed run.
+
+        Raises UserError when another run holds the lock.
+        """
+        if not self._real_path.is_dir():
+            yield  # there is no run to resume, and the checkpoint's reader says so
+            return
+        with lock_folder(self._real_path) as self.require_not_moved:
+            yield
+
+    def require_unused(self, overwrite: bool) -> None:
+        """Raises UserError when the folder holds a run and `overwrite` is false."""
+        files = [*self.files, *self._other_checkpoints]
+        used = [file.name for file in files if file.exists()]
+        used += [self.events.name] if self._event_files() else []
+        if used and not overwrite:
+            raise UserError(
+                f"{self.path} already holds a run ({', '.join(used)}): continue it with --resume, "
+                "replace it with --overwrite, or name another folder with --out"
+            )
+
+    def remove_old_run(self) -> None:
+        """Removes the files of another run, after the new run's first checkpoint is written.
+
+        Raises UserError when one cannot be removed.
+        """
+        _remove(*self._other_checkpoints)
+        if events := self._event_files():
+            _remove(*events)
+            with contextlib.suppress(OSError):  # the folder holds other files too
+                self.events.rmdir()
+
+    def start_files(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
+        """Writes the settings and the history so far, and removes temporary files and the picture.
+
+        Raises UserError when the folder cannot be written.
+        """
+        for file in (*self.files, *self._other_checkpoints):
+            _remove(*self._real_path.glob(f".{file.name}.*.tmp"))
+        _remove(self.picture)
+        write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
+        lines = [CSV_HEADER, *(record.csv_row() for record in history)]
+        write_atomically(self.history, "".join(line + "\n" for line in lines).encode())
+
+    def append(self, record: EpisodeRecord) -> None:
+        """Adds a row to history.csv. Raises UserError when it cannot be written."""
+        self.require_not_moved()
+        try:
+            with open(self.history, "a", encoding="ascii") as file:
+                file.write(record.csv_row() + "\n")
+        except OSError as error:
+            raise UserError(f"cannot write {self.history}: {error.strerror}") from error
+
+    def _event_files(self) -> list[Path]:
+        # By their names: a folder called tensorboard may hold other files.
+        return list(self.events.glob("events.out.tfevents.*"))
+
+
+def _remove(*files: Path) -> None:
+    for file in files:
+        try:
+            file.unlink(missing_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot replace {file}: {error.strerror}") from error

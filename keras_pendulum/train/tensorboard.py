@@ -1,0 +1,74 @@
+"""Event files for TensorBoard: curves and phase planes of a run."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+from typing import TYPE_CHECKING, Any
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.errors import UserError
+
+if TYPE_CHECKING:
+    from keras_pendulum.dqn.network import DQN
+    from keras_pendulum.history import EpisodeRecord
+
+_EPISODES_BETWEEN_PLANES = 50  # drawing the phase planes takes half a second
+
+
+class TensorBoardLog:
+    """A listener for `train_dqn` that writes event files.
+
+    Args:
+        folder: folder for the event files; it is created after the first episode.
+        config: the settings of the run.
+
+    Raises UserError when the package tensorboard is not installed.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], config: Config) -> None:
+        if importlib.util.find_spec("tensorboard") is None:
+            raise UserError("tensorboard is not installed: pip install tensorboard")
+        self._folder = os.fspath(folder)
+        self._config = config
+        self._writer_or_none: Any = None
+
+    def __call__(self, record: EpisodeRecord) -> None:
+        """Writes the figures of an episode."""
+        import tensorflow as tf
+
+        values = {
+            "return": record.episode_return,
+            "average reward a step": record.average_reward,
+            "epsilon": record.epsilon,
+            "loss": record.loss,
+            "seconds": record.seconds,
+        }
+        with self._writer().as_default(step=record.episode):
+            for name, value in values.items():
+                if not math.isnan(value):
+                    tf.summary.scalar(name, value)
+
+    def on_checkpoint(self, network: DQN, episode: int) -> None:
+        """Writes the phase planes of a pendulum's network, every 50 episodes and at the end."""
+        import tensorflow as tf
+
+        from keras_pendulum.optimum.phase_plane import run_phase_planes
+        from keras_pendulum.train import run_figure
+
+        is_last = episode == self._config.episodes - 1
+        if is_last or episode % _EPISODES_BETWEEN_PLANES == 0:
+            planes = run_phase_planes(network, self._config)
+            if planes:
+                picture = tf.io.decode_png(run_figure.draw_phase_planes(planes))
+                with self._writer().as_default(step=episode):
+                    tf.summary.image("phase plane", picture[tf.newaxis])
+        self._writer().flush()
+
+    def _writer(self) -> Any:
+        import tensorflow as tf
+
+        if self._writer_or_none is None:
+            self._writer_or_none = tf.summary.create_file_writer(self._folder)
+        return self._writer_or_none

@@ -1,0 +1,152 @@
+"""Training as a function: a run, its listeners, and the files that it leaves."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.dqn.network import DQN
+from keras_pendulum.errors import UserError
+from keras_pendulum.evaluate.evaluation import optimal_training_return, random_return
+from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.optimum.phase_plane import run_phase_planes
+from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.train import run_figure
+from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
+from keras_pendulum.train.loop import train_episodes
+from keras_pendulum.train.run import Run, make_run
+from keras_pendulum.train.run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """The trained network, and the record of each episode."""
+
+    network: DQN
+    history: list[EpisodeRecord]
+    finished: bool  # false where `should_stop` ended the run before its last episode
+
+
+def train_dqn(
+    config: Config,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    init: DQN | None = None,
+    render: bool = False,
+    overwrite: bool = False,
+    resume: bool = False,
+    listeners: Iterable[Callable[[EpisodeRecord], None]] = (),
+    on_checkpoint: Callable[[DQN, int], None] = lambda network, episode: None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> TrainingResult:
+    """Trains a DQN.
+
+    Args:
+        config: the settings; `preset` returns them.
+        out: folder for checkpoint, history, settings and picture; None writes no file.
+        init: a network whose weights replace the seeded initial weights.
+        render: whether to show the environment in a window, at its own speed.
+        overwrite: replaces a run that `out` already holds.
+        resume: continues from the checkpoint in `out`; `config` may change only `episodes` and
+            `save_every`.
+        listeners: called with the record of each episode.
+        on_checkpoint: called with the network and the episode at each checkpoint.
+        should_stop: called after each episode; true ends the run there, with a checkpoint.
+
+    Raises:
+        ConfigError: the settings do not fit `init` or the checkpoint.
+        WeightsError: the checkpoint is damaged.
+        UserError: `resume` is combined with `init` or `overwrite`; `out` is in use, cannot be
+            written or is moved meanwhile; or an observation, a reward, a loss or a weight is not
+            finite. The last checkpoint then holds finite weights.
+    """
+    if resume and (init is not None or overwrite):
+        raise UserError("resume continues a run; init and overwrite start a new one")
+    listeners = list(listeners)
+    folder = None if out is None else RunFolder(out, config.environment)
+    with contextlib.ExitStack() as stack:
+        if resume:
+            if folder is None:
+                raise UserError("resume needs `out`, the folder of the run")
+            stack.enter_context(folder.lock())
+            run = load_checkpoint(folder.weights, config, render)
+            stack.callback(run.env.close)
+        else:
+            run = make_run(config, init, render)
+            stack.callback(run.env.close)
+            if folder is not None:
+                folder.create()
+                stack.enter_context(folder.lock())
+                folder.require_unused(overwrite)
+                # The checkpoint comes before the other files: a run killed now can be resumed, and
+                # no policy of another run stays in the folder.
+                save_checkpoint(run, folder.weights)
+                folder.remove_old_run()
+        if folder is None:
+            finished = _train(run, listeners, should_stop)
+        else:
+            folder.start_files(config, run.history)
+            finished = _train_in_folder(run, folder, listeners, on_checkpoint, should_stop)
+    return TrainingResult(run.agent.online, run.history, finished)
+
+
+def _train_in_folder(
+    run: Run,
+    folder: RunFolder,
+    listeners: Iterable[Callable[[EpisodeRecord], None]],
+    on_checkpoint: Callable[[DQN, int], None],
+    should_stop: Callable[[], bool],
+) -> bool:
+    """Trains as `_train` does, and writes history, checkpoints and the picture."""
+    config = run.config
+    last_saved = -1  # the episode of the last checkpoint
+    with CheckpointWriter(folder.weights, folder.require_not_moved) as writer:
+
+        def save() -> None:
+            nonlocal last_saved
+            last_saved = run.history[-1].episode
+            writer.save(run)
+            on_checkpoint(run.agent.online, last_saved)
+
+        def write_files(record: EpisodeRecord) -> None:
+            folder.append(record)
+            if record.episode % config.save_every == 0:
+                save()
+
+        finished = _train(run, [write_files, *listeners], should_stop)
+        if run.history[-1].episode != last_saved:
+            save()
+    if finished:
+        planes = run_phase_planes(run.agent.online, config)
+        picture = run_figure.draw_run(
+            run.history, config.environment, _reference_returns(config), planes
+        )
+        write_atomically(folder.picture, picture)
+    return finished
+
+
+def _train(
+    run: Run,
+    listeners: Iterable[Callable[[EpisodeRecord], None]],
+    should_stop: Callable[[], bool],
+) -> bool:
+    """Trains to the last episode or until `should_stop`; returns whether the run is finished."""
+    for record in train_episodes(run):
+        for listener in listeners:
+            listener(record)
+        if should_stop() and record.episode + 1 < run.config.episodes:
+            return False
+    return True
+
+
+def _reference_returns(config: Config) -> dict[str, float]:
+    """Returns the mean returns of a training episode that the picture compares with, by name."""
+    optimum = optimal_training_return(config)
+    if math.isnan(optimum):
+        return {}
+    random = random_return(config.environment, config.gravity, config.max_episode_steps)
+    return {"best possible": optimum, "random actions": random}
