@@ -1,1 +1,1 @@
-"""Figures that the README states, each from one command."""
+"""Benchmarks: each is one command that measures figures of README.md."""

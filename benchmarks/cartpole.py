@@ -1,11 +1,12 @@
-"""The CartPole agent here and in PyTorch: how fast, and whether both learn alike.
+"""The CartPole agent of this package and that of the PyTorch notebooks: speed and learning curves.
 
     python -m benchmarks.cartpole [SEEDS]
 
-Trains the preset `cartpole-original` and the notebooks' program (tests/torch_cartpole.py, extra
-`bench`) for 150 episodes with each of the seeds 0, 1, … (5), each run a process of its own, in
-turns. Environment steps a second are those of the training loop from the first update on, without
-the compilation here. Learning curves are mean returns of blocks of 30 episodes.
+Trains the preset `cartpole-original` and the notebooks' program (tests/torch/torch_cartpole.py,
+extra `bench`) for 150 episodes with the seeds 0, 1, … (5 seeds). Each run is a process, and the
+programs run in turns. The speed is that of the training loop without its first 20 episodes, in
+which the update is compiled. The learning curves are mean returns of 30 episodes each. It takes
+three minutes.
 """
 
 from __future__ import annotations
@@ -21,46 +22,47 @@ import numpy as np
 from benchmarks.report import median, run_process, versions, write
 
 EPISODES = 150
-BLOCK = 30
-WARM_UP = 20  # episodes; updates begin within them
+BLOCK = 30  # episodes
+UNTIMED = 20  # episodes; the first update is one of theirs
 PROGRAMS = {"here": "this package, `cartpole-original`", "torch": "the notebooks' program, PyTorch"}
 
 
-def run_here(seed: int) -> Iterator[int]:
-    """The steps of each episode of this package's run."""
+def train_here(seed: int) -> Iterator[int]:
+    """Trains this package's agent; yields the number of steps of each episode."""
     import keras_pendulum as kp
-    from keras_pendulum.run import Run
+    from keras_pendulum.train.loop import train_episodes
+    from keras_pendulum.train.run import make_run
 
-    run = Run(kp.preset("cartpole-original", seed=seed, episodes=EPISODES))
-    for record in run.episodes():
+    run = make_run(kp.preset("cartpole-original", seed=seed, episodes=EPISODES))
+    for record in train_episodes(run):
         yield int(record.episode_return)
 
 
-def run_torch(seed: int) -> Iterator[int]:
-    """The steps of each episode of the PyTorch program."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+def train_torch(seed: int) -> Iterator[int]:
+    """Trains the PyTorch program's agent; yields the number of steps of each episode."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "torch"))
     import torch
     import torch_cartpole
 
     torch.manual_seed(seed)
-    learner = torch_cartpole.Learner(torch_cartpole.to_keras(torch_cartpole.network()))
-    for actions in torch_cartpole.episodes(learner, seed, EPISODES):
+    agent = torch_cartpole.Agent(torch_cartpole.to_keras(torch_cartpole.network()))
+    for actions in torch_cartpole.train_episodes(agent, seed, EPISODES):
         yield len(actions)
 
 
 def measure(program: str, seed: int) -> None:
-    """One run in this process; prints its returns and its steps a second."""
+    """Trains in this process; prints the returns and the steps per second as JSON."""
     returns = []
-    for steps in {"here": run_here, "torch": run_torch}[program](seed):
+    for steps in {"here": train_here, "torch": train_torch}[program](seed):
         returns.append(steps)
-        if len(returns) == WARM_UP:
+        if len(returns) == UNTIMED:
             started = time.perf_counter()
-    rate = sum(returns[WARM_UP:]) / (time.perf_counter() - started)
+    rate = sum(returns[UNTIMED:]) / (time.perf_counter() - started)
     print(json.dumps({"returns": returns, "rate": rate}))
 
 
 def main(seeds: int = 5) -> None:
-    """Runs all in turns and writes the two tables."""
+    """Makes all runs and writes the two tables."""
     returns: dict[str, list[list[int]]] = {name: [] for name in PROGRAMS}
     rates: dict[str, list[float]] = {name: [] for name in PROGRAMS}
     for seed in range(seeds):
@@ -73,7 +75,7 @@ def main(seeds: int = 5) -> None:
     speed = [
         {
             "program": PROGRAMS[name],
-            "environment steps a second": round(median(rates[name])),
+            "environment steps per second": round(median(rates[name])),
             "times as fast": round(median(rates[name]) / median(rates["torch"]), 1),
             "runs": seeds,
         }
@@ -86,14 +88,16 @@ def main(seeds: int = 5) -> None:
     }
     curves = []
     for i in range(EPISODES // BLOCK):
-        ours, theirs = (blocks[name][:, i] for name in PROGRAMS)
-        spread = float(np.hypot(ours.std(ddof=1), theirs.std(ddof=1)))
+        keras, torch = (blocks[name][:, i] for name in PROGRAMS)
+        deviation = float(np.hypot(keras.std(ddof=1), torch.std(ddof=1)))
         curves.append(
             {
                 "episodes": f"{i * BLOCK} to {(i + 1) * BLOCK - 1}",
-                "here": f"{ours.mean():.1f} ± {ours.std(ddof=1):.1f}",
-                "PyTorch": f"{theirs.mean():.1f} ± {theirs.std(ddof=1):.1f}",
-                "difference in spreads": round(abs(ours.mean() - theirs.mean()) / spread, 2),
+                "here": f"{keras.mean():.1f} ± {keras.std(ddof=1):.1f}",
+                "PyTorch": f"{torch.mean():.1f} ± {torch.std(ddof=1):.1f}",
+                "difference in standard deviations": round(
+                    abs(keras.mean() - torch.mean()) / deviation, 2
+                ),
             }
         )
     write("cartpole_learning", "python -m benchmarks.cartpole", curves, also=versions(["torch"]))

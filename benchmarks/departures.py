@@ -1,12 +1,12 @@
-"""What each setting in which a preset departs from the one before it is worth.
+"""The value of each setting in which a preset departs from an earlier one.
 
     python -m benchmarks.departures [reference|swingup|cartpole [SEEDS]]
 
-Trains `reference`, which departs from `original`, `swingup`, which departs from `reference`, or
-`cartpole`, which departs from `cartpole-original`: as it is, and with one departure taken back at a
-time, with the training seeds 0, 1, … (5 seeds), two at a time. Greedy regrets on the starts of
-seeds 0 to 99 go to benchmarks/results, from which README's tables of departures take their
-figures. `reference` takes five minutes on two cores, `swingup` three for each seed and departure.
+`reference` departs from `original`, `swingup` from `reference`, and `cartpole` from
+`cartpole-original`. Trains both presets, and the later one without each of its departures, with the
+training seeds 0, 1, … (5 seeds), two runs at a time. Writes the greedy regrets on the starts of
+seeds 0 to 99; README.md's tables of departures contain them. On two cores, `reference` takes five
+minutes, `swingup` with 3 seeds fifteen, and `cartpole` with 2 seeds ten.
 """
 
 from __future__ import annotations
@@ -18,40 +18,39 @@ from dataclasses import fields, replace
 from functools import partial
 
 import keras_pendulum as kp
-from benchmarks.report import RESULTS, Row, best_mean_return, write
+from benchmarks.report import RESULTS, Row, write
 
 BEFORE = {"reference": "original", "swingup": "reference", "cartpole": "cartpole-original"}
-# The task itself is no departure, and the name none either.
+# The name and the task are no departures.
 _NOT_COUNTED = ("preset", "gravity")
-# What makes no sense without a departure is taken back with it: after each step it is not known
-# how many updates there will be for a cosine to fall over.
-_TAKEN_BACK_TOO = {("cartpole", "update_after"): ("learning_rate_schedule",)}
+# The second setting needs the first: with an update after each step, the number of updates, which
+# the cosine needs, is not known before the run.
+_DEPENDENT = {("cartpole", "train_frequency"): ("learning_rate_schedule",)}
 
 
 def departures(preset: str) -> list[str]:
-    """The settings in which a preset differs from the one before it."""
-    ours, theirs = kp.preset(preset), kp.preset(BEFORE[preset])
+    """Returns the settings in which a preset departs from the earlier one."""
+    after, before = kp.preset(preset), kp.preset(BEFORE[preset])
     names = [spec.name for spec in fields(kp.Config) if spec.name not in _NOT_COUNTED]
-    return [name for name in names if getattr(ours, name) != getattr(theirs, name)]
+    return [name for name in names if getattr(after, name) != getattr(before, name)]
 
 
 def measured(preset: str) -> dict[str, list[float]]:
-    """The regrets of the last measurement, by what was taken back; the presets by their names."""
+    """Returns the regrets in benchmarks/results, by preset and by setting that is not changed."""
     rows = json.loads((RESULTS / f"departures_{preset}.json").read_text())["rows"]
     return {row["training"]: row["regrets"] for row in rows}
 
 
 def regret(config: kp.Config, starts: range) -> float:
-    """Greedy regret after one training, rounded to 0.1."""
+    """Trains; returns the greedy regret on the starts of these seeds, rounded to 0.1."""
     network = kp.train_dqn(config).network
-    score = kp.evaluate_policy(network, episodes=len(starts), seed=starts[0])
-    return round(best_mean_return(score) - score.mean_return, 1)
+    return round(kp.evaluate_policy(network, episodes=len(starts), seed=starts[0]).regret, 1)
 
 
-def trained(variants: dict[str, kp.Config], seeds: range, starts: range) -> list[Row]:
-    """A row for each variant, trained with all of `seeds`, two at a time."""
+def train_variants(variants: dict[str, kp.Config], seeds: range, starts: range) -> list[Row]:
+    """Trains each variant with each of the seeds, two runs at a time; returns a row for each."""
     rows: list[Row] = []
-    # Fresh processes, because TensorFlow does not survive a fork.
+    # TensorFlow does not survive a fork, so the processes are spawned.
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         for name, config in variants.items():
             configs = [replace(config, seed=seed) for seed in seeds]
@@ -70,12 +69,12 @@ def trained(variants: dict[str, kp.Config], seeds: range, starts: range) -> list
 
 def main(preset: str = "reference", seeds: str = "5") -> None:
     """Trains every variant and writes the results."""
-    ours, theirs = kp.preset(preset), kp.preset(BEFORE[preset])
-    variants = {BEFORE[preset]: replace(theirs, gravity=ours.gravity), preset: ours}
+    after, before = kp.preset(preset), kp.preset(BEFORE[preset])
+    variants = {BEFORE[preset]: replace(before, gravity=after.gravity), preset: after}
     for name in departures(preset):
-        back = (name, *_TAKEN_BACK_TOO.get((preset, name), ()))
-        variants[name] = replace(ours, **{each: getattr(theirs, each) for each in back})
-    rows = trained(variants, range(int(seeds)), range(100))
+        unchanged = (name, *_DEPENDENT.get((preset, name), ()))
+        variants[name] = replace(after, **{each: getattr(before, each) for each in unchanged})
+    rows = train_variants(variants, range(int(seeds)), range(100))
     write(f"departures_{preset}", f"python -m benchmarks.departures {preset} {seeds}", rows)
 
 

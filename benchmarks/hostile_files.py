@@ -1,10 +1,10 @@
-"""What it costs to refuse files that were made to cost time or memory.
+"""Measures time and memory to refuse files that were made to cost time or memory.
 
     python -m benchmarks.hostile_files
 
-The files of tests/test_hostile_files.py in both layouts, and one with a million names; for each the
-seconds that `load_weights` takes to refuse it and by how much the process has then grown. Needs the
-extra `test`; a minute.
+Loads the files of tests/storage/test_h5_validation.py in both layouts, and a file with a million
+names. The table gives the slowest of several calls of `load_weights`, and the growth of the
+process. Needs the extra `test`; a minute.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ import keras_pendulum as kp
 from benchmarks.report import Row, write
 
 ATTEMPTS = 5
-MILLION = "a million names"
+MILLION_NAMES = "a million names"
 
 
-def memory() -> float:
-    """The most that this process has held so far, MB."""
+def peak_memory() -> float:
+    """Returns the peak memory of this process in MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
 
 
-def a_million_names(file: h5py.File, kernel: str) -> None:
-    """More names than any network has, none of them leading anywhere."""
+def add_million_names(file: h5py.File, kernel: str) -> None:
+    """Adds a million links that lead nowhere."""
     group = file.create_group("names")
     for i in range(1_000_000):
         group[str(i)] = h5py.SoftLink("/nowhere")
 
 
-def refused(kind: str, path: Path) -> Row:
-    """A line of the table. Raises AssertionError when the file is not refused."""
-    before = memory()
+def measure(kind: str, path: Path) -> Row:
+    """Returns a row of the table. Raises AssertionError when the file is not refused."""
+    memory_before = peak_memory()
     times = []
     for _ in range(ATTEMPTS):
         started = time.perf_counter()
@@ -52,33 +52,34 @@ def refused(kind: str, path: Path) -> Row:
         "file": kind,
         "MB": round(path.stat().st_size / 1e6, 2),
         "slowest, ms": round(max(times) * 1e3, 1),
-        "memory, MB": round(memory() - before, 1),
+        "memory, MB": round(peak_memory() - memory_before, 1),
     }
 
 
-def make(kind: str, layout: str, path: Path) -> None:
-    """Makes one of the files."""
-    from test_hostile_files import HOSTILE, hostile_file
+def make_file(kind: str, layout: str, path: Path) -> None:
+    """Writes a hostile file."""
+    from test_h5_validation import HOSTILE, hostile_file
 
-    hostile_file(path, a_million_names if kind == MILLION else HOSTILE[kind][0], layout)
+    hostile_file(path, add_million_names if kind == MILLION_NAMES else HOSTILE[kind][0], layout)
 
 
 def main() -> None:
-    """Makes the files, measures, writes the table."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-    from test_hostile_files import HOSTILE, KERNEL
+    """Writes the files, measures them and writes the table."""
+    tests = Path(__file__).parents[1] / "tests"
+    sys.path[:0] = [str(tests), str(tests / "storage")]
+    from test_h5_validation import HOSTILE, KERNEL
 
     with tempfile.TemporaryDirectory() as folder:
         files = {
             (kind, layout): Path(folder) / f"{i}-{layout}.h5"
-            for i, kind in enumerate((*HOSTILE, MILLION))
+            for i, kind in enumerate((*HOSTILE, MILLION_NAMES))
             for layout in KERNEL
         }
-        # In a process of its own, whose memory does not count.
+        # In another process, so that its memory does not count.
         with multiprocessing.get_context("spawn").Pool(1) as pool:
-            pool.starmap(make, [(*key, path) for key, path in files.items()])
-        kp.load_weights(kp.find_weights("reference"))  # everything is imported by then
-        rows = [refused(", ".join(key), path) for key, path in files.items()]
+            pool.starmap(make_file, [(*key, path) for key, path in files.items()])
+        kp.load_weights(kp.find_weights("reference"))  # imports everything before the measurement
+        rows = [measure(", ".join(key), path) for key, path in files.items()]
     write("hostile_files", "python -m benchmarks.hostile_files", rows)
 
 

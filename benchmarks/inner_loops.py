@@ -1,11 +1,11 @@
-"""What an update and an environment step cost, beside what they cannot do without.
+"""The cost of an update and of an environment step beside the work that they cannot avoid.
 
     python -m benchmarks.inner_loops
 
-An update inside the compiled loop against its bare matrix products in PyTorch (extra `bench`), both
-on one thread: forward through the online and the target network, then backward for weights and
-inputs. And a step of the acting loop, policy included, against Gymnasium's step alone. Medians, the
-two sides of a row in turns.
+Compares an update inside the compiled loop with its bare matrix products in PyTorch (extra
+`bench`), both on one thread: forward through the online and the target network, and backward for
+weights and inputs. Compares a step of the training loop, policy included, with Gymnasium's step.
+The two sides of a row run in turns; the table has medians. It takes a minute.
 """
 
 from __future__ import annotations
@@ -19,25 +19,27 @@ import numpy as np
 
 import keras_pendulum as kp
 from benchmarks.report import median, versions, write
-from keras_pendulum.environment import make_environment
-from keras_pendulum.replay import Transitions
-from keras_pendulum.run import Run
+from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.train.loop import train_episodes
+from keras_pendulum.train.run import make_run
 
-UPDATES = 200  # in one call: what the call itself costs no longer counts
+UPDATES = 200  # in one call, so that the cost of the call itself is negligible
 ROUNDS = 25
+STEPS = 4000
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """How long one call takes."""
+    """Returns the duration of one call."""
     started = time.perf_counter()
     work()
     return time.perf_counter() - started
 
 
 def update(batch_size: int) -> Callable[[], object]:
-    """UPDATES updates of the preset `reference`, with batches of another size."""
-    config = kp.preset("reference", batch_size=batch_size, updates_per_episode=UPDATES)
-    agent = Run(config).agent
+    """Returns a function that makes UPDATES updates of the preset `reference`."""
+    config = kp.preset("reference", batch_size=batch_size)
+    agent = make_run(config).agent
     random = np.random.default_rng(0)
     shape = (UPDATES, batch_size)
     batches = Transitions(
@@ -51,54 +53,54 @@ def update(batch_size: int) -> Callable[[], object]:
 
 
 def products(batch_size: int) -> Callable[[], object]:
-    """The matrix products of as many updates, and nothing else."""
+    """Returns a function that computes the matrix products of UPDATES updates."""
     import torch
 
-    torch.set_num_threads(int(os.environ["TF_NUM_INTRAOP_THREADS"]))  # as TensorFlow has
+    torch.set_num_threads(int(os.environ["TF_NUM_INTRAOP_THREADS"]))  # the same as TensorFlow
     config = kp.preset("reference")
     sizes = (3, *config.hidden_units, config.torque_count)
-    kernels = [torch.randn(a, b) for a, b in pairwise(sizes)]
-    inputs = [torch.randn(batch_size, a) for a in sizes[:-1]]
-    slopes = [torch.randn(batch_size, b) for b in sizes[1:]]
+    kernels = [torch.randn(inputs, outputs) for inputs, outputs in pairwise(sizes)]
+    features = [torch.randn(batch_size, inputs) for inputs in sizes[:-1]]
+    gradients = [torch.randn(batch_size, outputs) for outputs in sizes[1:]]
 
     def work() -> None:
         for _ in range(UPDATES):
             for _ in ("online", "target"):
-                for features, kernel in zip(inputs, kernels, strict=True):
-                    features @ kernel
-            for features, slope in zip(inputs, slopes, strict=True):
-                features.T @ slope
-            for slope, kernel in zip(slopes[1:], kernels[1:], strict=True):
-                slope @ kernel.T
+                for feature, kernel in zip(features, kernels, strict=True):
+                    feature @ kernel
+            for feature, gradient in zip(features, gradients, strict=True):
+                feature.T @ gradient
+            for gradient, kernel in zip(gradients[1:], kernels[1:], strict=True):
+                gradient @ kernel.T
 
     return work
 
 
-def acting(steps: int) -> Callable[[], object]:
-    """Greedy steps of the acting loop: policy, environment, replay buffer."""
+def training_steps() -> Callable[[], object]:
+    """Returns a function that makes STEPS greedy steps of the training loop, without updates."""
     config = kp.preset(
         "reference",
         episodes=1_000_000,
-        learning_starts=1_000_000,
+        warmup_episodes=1_000_000,
         epsilon_start=0.0,
         epsilon_min=0.0,
     )
-    episodes = Run(config).episodes()
+    episodes = train_episodes(make_run(config))
 
     def work() -> None:
-        for _ in range(steps // config.episode_steps):
+        for _ in range(STEPS // config.max_episode_steps):
             next(episodes)
 
     return work
 
 
-def environment(steps: int) -> Callable[[], object]:
-    """Steps of Gymnasium's environment alone."""
+def environment_steps() -> Callable[[], object]:
+    """Returns a function that makes STEPS steps of Gymnasium's environment."""
     env = make_environment("Pendulum-v1", 1.0)
     torque = np.array([0.5])
 
     def work() -> None:
-        for step in range(steps):
+        for step in range(STEPS):
             if step % 200 == 0:
                 env.reset(seed=step)
             env.step(torque)
@@ -112,27 +114,26 @@ def main() -> None:
     for batch_size in (32, 128):
         sides = [update(batch_size), products(batch_size)]
         for side in sides:
-            side()  # compiles
+            side()  # the first call compiles
         times = [[seconds(side) / UPDATES * 1e3 for side in sides] for _ in range(ROUNDS)]
-        ours, bare = (median(column, 4) for column in zip(*times, strict=True))
+        here, bare = (median(column, 4) for column in zip(*times, strict=True))
         rows.append(
             {
                 "work": f"update, batch {batch_size}",
-                "here": f"{ours:.3f} ms",
+                "here": f"{here:.3f} ms",
                 "bare": f"{bare:.3f} ms (matrix products)",
-                "ratio": round(ours / bare, 2),
+                "ratio": round(here / bare, 2),
             }
         )
-    steps = 4000
-    both = [acting(steps), environment(steps)]
-    times = [[seconds(side) / steps * 1e6 for side in both] for _ in range(ROUNDS)]
-    ours, bare = (median(column, 2) for column in zip(*times, strict=True))
+    sides = [training_steps(), environment_steps()]
+    times = [[seconds(side) / STEPS * 1e6 for side in sides] for _ in range(ROUNDS)]
+    here, bare = (median(column, 2) for column in zip(*times, strict=True))
     rows.append(
         {
             "work": "environment step with policy",
-            "here": f"{ours:.1f} µs",
+            "here": f"{here:.1f} µs",
             "bare": f"{bare:.1f} µs (Gymnasium alone)",
-            "ratio": round(ours / bare, 2),
+            "ratio": round(here / bare, 2),
         }
     )
     write("inner_loops", "python -m benchmarks.inner_loops", rows, also=versions(["torch"]))

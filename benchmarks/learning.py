@@ -1,14 +1,16 @@
-"""How long the task of `reference` takes here and in other libraries, and how well it ends.
+"""The duration and the regret of the training of `reference`, here and in other libraries.
 
     python -m benchmarks.learning [RUNS [PYTHON]]
 
-Processes in turns, one for each of the training seeds 0, 1, … (3 runs), all with the numbers of the
-preset `reference`; medians, from the start of a process until its final weights are kept, and until
-it ends. This package's is the command `keras_pendulum.train` with all it does: checkpoints, and
-afterwards a picture and an evaluation; and once more with its updates between the episodes, not
-beside them. The others do nothing but train. They run under PYTHON, that of an environment with the
-extra `bench`; by default the same as this package. Keras imports JAX where it finds it, so one of
-their own is fairer. What is not installed is left out.
+Trains with the settings of `reference` and the training seeds 0, 1, … (3 runs). Each run is a
+process, and the libraries run in turns. The table has medians of the time from the start of a
+process until its final weights are saved, and until its end. This package runs its command
+`keras_pendulum.train`, which also writes checkpoints, draws a picture and evaluates; the others
+only train. It takes six minutes.
+
+PYTHON runs the other libraries; it belongs to an environment with the extra `bench`, by default to
+the one of this package. Keras imports JAX if it is installed, so a separate environment is fairer
+to this package. A library that is not installed is left out.
 """
 
 from __future__ import annotations
@@ -24,24 +26,27 @@ import numpy as np
 
 from benchmarks.report import Process, median, run_process, write
 
-# Rows of this package, with the flags of each; the shares are those of the first.
-OURS = {
-    "this package": (),
-    "this package, learning between the episodes": ("--update-after", "episode"),
-}
-PEERS = {"stable-baselines3": "sb3", "sbx-rl": "sbx"}  # package: name in benchmarks.peers
+THIS_PACKAGE = "this package"
+PEERS = {"stable-baselines3": "sb3", "sbx-rl": "sbx"}  # package: its name in benchmarks.peers
 
 
 class Training(NamedTuple):
     """A process that has trained a network."""
 
-    kept: float  # s, from its start until its final weights were kept
+    saved: float  # s, from its start until its final weights were saved
     process: Process
-    weights: Path
+    weights: Path  # an .h5 of this package, an .npz of a peer
+
+
+def train(weights: Path, *arguments: str, python: str = sys.executable) -> Training:
+    """Runs `python -m ARGUMENTS`, which writes `weights`."""
+    started = time.time()
+    process = run_process("-m", *arguments, python=python)
+    return Training(weights.stat().st_mtime - started, process, weights)
 
 
 def regret(weights: Path) -> float:
-    """Greedy regret on the starts of seeds 0 to 99, of an .h5 or of a peer's .npz."""
+    """Returns the greedy regret on the starts of seeds 0 to 99."""
     import keras_pendulum as kp
 
     if weights.suffix == ".h5":
@@ -55,49 +60,50 @@ def regret(weights: Path) -> float:
 
 
 def medians(trainings: Sequence[Training]) -> tuple[float, float]:
-    """Seconds until the weights were kept, and of the whole processes."""
-    kept = [training.kept for training in trainings]
-    return median(kept, 3), median([training.process.seconds for training in trainings], 3)
+    """Returns the seconds until the weights were saved, and those of the whole process."""
+    saved = [training.saved for training in trainings]
+    return median(saved, 3), median([training.process.seconds for training in trainings], 3)
 
 
 def main(runs: str = "3", python: str = sys.executable) -> None:
-    """Trains all in turns and writes the table."""
-    done: dict[str, list[Training]] = {}
+    """Makes all runs and writes the table."""
+    trainings: dict[str, list[Training]] = {THIS_PACKAGE: []}
     installed = run_process("-m", "benchmarks.peers", python=python).output.split("\n")
+    for package in PEERS:
+        if any(line.startswith(package) for line in installed):
+            trainings[package] = []
     with tempfile.TemporaryDirectory() as folder:
-
-        def run(name: str, weights: Path, words: Sequence[str], python: str) -> None:
-            started = time.time()
-            process = run_process("-m", *words, python=python)
-            kept = weights.stat().st_mtime - started
-            done.setdefault(name, []).append(Training(kept, process, weights))
-            print(f"{name} {kept:.1f} s, {process.seconds:.1f} s", flush=True)
-
         for seed in map(str, range(int(runs))):
-            for name, flags in OURS.items():
-                out = Path(folder) / seed / name
-                words = ["keras_pendulum.train", "--seed", seed, "--out", str(out), *flags]
-                run(name, out / "pendulum_weight.h5", words, sys.executable)
-            for package, library in PEERS.items():
-                if any(line.startswith(package) for line in installed):
-                    weights = Path(folder) / f"{library}{seed}.npz"
-                    run(package, weights, ["benchmarks.peers", library, seed, str(weights)], python)
-        regrets = {name: [regret(one.weights) for one in each] for name, each in done.items()}
+            for name, measured in trainings.items():
+                if name == THIS_PACKAGE:
+                    out = Path(folder) / seed
+                    command = ["keras_pendulum.train", "--seed", seed, "--out", str(out)]
+                    measured.append(train(out / "pendulum_weight.h5", *command))
+                else:
+                    weights = Path(folder) / f"{name}{seed}.npz"
+                    command = ["benchmarks.peers", PEERS[name], seed, str(weights)]
+                    measured.append(train(weights, *command, python=python))
+                last = measured[-1]
+                print(f"{name} {last.saved:.1f} s, {last.process.seconds:.1f} s", flush=True)
+        regrets = {
+            name: [regret(training.weights) for training in measured]
+            for name, measured in trainings.items()
+        }
 
-    our_kept, our_process = medians(done[next(iter(OURS))])
+    saved_here, process_here = medians(trainings[THIS_PACKAGE])
     rows: list[dict[str, Any]] = []
-    for name, each in done.items():
-        kept, process = medians(each)
+    for name, measured in trainings.items():
+        saved, process = medians(measured)
         rows.append(
             {
                 "library": name,
-                "seconds until its weights are kept": round(kept, 1),
-                "this package's share": round(our_kept / kept, 2),
+                "seconds until its weights are saved": round(saved, 1),
+                "this package's share": round(saved_here / saved, 2),
                 "seconds of the whole process": round(process, 1),
-                "this package's share of the process": round(our_process / process, 2),
+                "this package's share of the process": round(process_here / process, 2),
                 "mean regret": round(float(np.mean(regrets[name])), 1),
                 "worst regret": round(max(regrets[name]), 1),
-                "peak memory, MB": round(max(one.process.peak_memory for one in each)),
+                "peak memory, MB": round(max(each.process.peak_memory for each in measured)),
                 "runs": int(runs),
             }
         )

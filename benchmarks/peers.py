@@ -1,13 +1,13 @@
-"""The task of `reference` done by other libraries, with the same numbers.
+"""The training of `reference` by other libraries, with the same settings.
 
-    python -m benchmarks.peers              # which of them are installed
+    python -m benchmarks.peers              # prints which libraries are installed
     python -m benchmarks.peers sb3|sbx SEED OUT.npz
 
-Trains a DQN of Stable-Baselines3 (PyTorch) or of sbx (JAX) and keeps the network's weights in
-OUT.npz, in Keras's order. Needs the extra `bench`. The settings come from the preset. Where a
-library has no such setting, it keeps its own way: both take the Huber loss of the taken action, and
-count the blend of the target network in steps, so that their updates, as many as here, come after
-a few steps each and not after the episode.
+Trains a DQN of Stable-Baselines3 (PyTorch) or of sbx (JAX) and writes the network's weights to
+OUT.npz, in Keras's order. Needs the extra `bench`. The settings are those of the preset, except
+where the libraries differ: both use the Huber loss of the taken action. Both count the period of
+the target update in steps, so they make their updates, as many as here, after every few steps and
+not after the episode.
 """
 
 from __future__ import annotations
@@ -22,38 +22,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report import versions
-from keras_pendulum.config import Config
-from keras_pendulum.environment import make_environment
-from keras_pendulum.presets import preset
-from keras_pendulum.torque import TorqueGrid
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.presets import preset
+from keras_pendulum.environments.actions import TorqueGrid
+from keras_pendulum.environments.tasks import make_environment
 
 
 class DiscreteTorques(gymnasium.ActionWrapper[Any, Any, Any]):
-    """The pendulum with an index as its action."""
+    """The pendulum with the index of a torque as its action."""
 
     def __init__(self, config: Config) -> None:
         super().__init__(
-            make_environment(config.environment, config.gravity, steps=config.episode_steps)
+            make_environment(config.environment, config.gravity, steps=config.max_episode_steps)
         )
         self._torques = TorqueGrid(config.torque_count)
         self.action_space = gymnasium.spaces.Discrete(config.torque_count)
 
     def action(self, action: Any) -> NDArray[np.float64]:
-        """The torque [1] in N·m."""
-        return self._torques.control(int(action))
+        """Returns the torque [1] in N·m."""
+        return self._torques.to_env_action(int(action))
 
 
-def settings(config: Config) -> dict[str, Any]:
-    """The arguments that both libraries understand."""
-    times = math.gcd(config.episode_steps, config.updates_per_episode)  # in an episode
-    steps, updates = config.episode_steps // times, config.updates_per_episode // times
+def common_settings(config: Config) -> dict[str, Any]:
+    """Returns the arguments that both libraries understand."""
+    periods = math.gcd(config.max_episode_steps, config.updates_per_episode)  # per episode
+    steps, updates = config.max_episode_steps // periods, config.updates_per_episode // periods
     return {
         "env": DiscreteTorques(config),
         "buffer_size": config.replay_capacity,
-        "learning_starts": (config.learning_starts + 1) * config.episode_steps,
+        "learning_starts": config.warmup_episodes * config.max_episode_steps,
         "batch_size": config.batch_size,
         "gamma": config.discount,
-        "tau": 1 - (1 - config.target_blend) ** updates,
+        "tau": 1 - (1 - config.tau) ** updates,
         "target_update_interval": steps,
         "train_freq": (steps, "step"),
         "gradient_steps": updates,
@@ -62,13 +62,13 @@ def settings(config: Config) -> dict[str, Any]:
     }
 
 
-def cosine(config: Config) -> Callable[[float], float]:
-    """The learning rate by the share of the run that remains."""
+def learning_rate_schedule(config: Config) -> Callable[[float], float]:
+    """Returns the cosine schedule; its argument is the remaining share of the run."""
     return lambda remaining: config.learning_rate * (1 - math.cos(math.pi * remaining)) / 2
 
 
-def epsilon(config: Config) -> Callable[[float], float]:
-    """ε by the share of the run that remains."""
+def epsilon_schedule(config: Config) -> Callable[[float], float]:
+    """Returns the schedule of ε; its argument is the remaining share of the run."""
 
     def schedule(remaining: float) -> float:
         episode = int((1 - remaining) * config.episodes)
@@ -78,25 +78,28 @@ def epsilon(config: Config) -> Callable[[float], float]:
 
 
 def train_sb3(config: Config) -> list[NDArray[np.float32]]:
-    """Stable-Baselines3's DQN."""
+    """Trains with Stable-Baselines3; returns the weights."""
     import stable_baselines3
     import torch
 
     model = stable_baselines3.DQN(
         "MlpPolicy",
-        learning_rate=cosine(config),
+        learning_rate=learning_rate_schedule(config),
         max_grad_norm=math.inf,
         policy_kwargs={"net_arch": list(config.hidden_units), "activation_fn": torch.nn.Tanh},
-        **settings(config),
+        **common_settings(config),
     )
-    model.exploration_schedule = epsilon(config)
-    model.learn(config.episodes * config.episode_steps)
+    model.exploration_schedule = epsilon_schedule(config)
+    model.learn(config.episodes * config.max_episode_steps)
     parameters = model.q_net.q_net.parameters()
     return [parameter.detach().numpy().T for parameter in parameters]
 
 
 def train_sbx(config: Config) -> list[NDArray[np.float32]]:
-    """The DQN of sbx, which always has two hidden layers of one width unless given another."""
+    """Trains with sbx; returns the weights.
+
+    The network of sbx has two hidden layers of the same width, so another class replaces it.
+    """
     import flax.linen as nn
     import optax
     import sbx
@@ -125,17 +128,17 @@ def train_sbx(config: Config) -> list[NDArray[np.float32]]:
         "MlpPolicy",
         learning_rate=config.learning_rate,
         policy_kwargs={"optimizer_class": adam},
-        **settings(config),
+        **common_settings(config),
     )
-    model.exploration_schedule = epsilon(config)
-    model.learn(config.episodes * config.episode_steps)
+    model.exploration_schedule = epsilon_schedule(config)
+    model.learn(config.episodes * config.max_episode_steps)
     layers = model.policy.qf_state.params["params"]
     arrays = [layers[f"Dense_{i}"][part] for i in range(len(widths)) for part in ("kernel", "bias")]
     return [np.asarray(array) for array in arrays]
 
 
 def main(library: str | None = None, seed: str = "0", out: str = "") -> None:
-    """Trains and keeps the weights, or names what is installed."""
+    """Trains and writes the weights, or prints which libraries are installed."""
     if library is None:
         print("\n".join(versions(["stable-baselines3", "torch", "sbx-rl", "jax"])))
         return

@@ -1,4 +1,4 @@
-"""What every benchmark shares: whole processes timed, and tables written with their machine."""
+"""The timing of whole processes, and the tables of the benchmarks with the machine they ran on."""
 
 from __future__ import annotations
 
@@ -15,9 +15,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import keras_pendulum as kp
-from keras_pendulum.environment import TASKS
-
 RESULTS = Path(__file__).parent / "results"
 _PACKAGES = ("tensorflow-cpu", "tensorflow", "keras", "gymnasium", "numpy")
 
@@ -25,16 +22,16 @@ Row = dict[str, Any]
 
 
 class Process(NamedTuple):
-    """A process that has ended well."""
+    """A process that has ended with exit status 0."""
 
     seconds: float  # from its start to its end
     peak_memory: float  # MB, resident
     output: str
 
 
-def run_process(*words: str, python: str = sys.executable) -> Process:
-    """Runs `python WORDS` and waits for it. Raises CalledProcessError when it fails."""
-    command = [python, *words]
+def run_process(*arguments: str, python: str = sys.executable) -> Process:
+    """Runs `python ARGUMENTS` and waits for it. Raises CalledProcessError when it fails."""
+    command = [python, *arguments]
     with tempfile.TemporaryFile("w+") as output:
         started = time.perf_counter()
         process = subprocess.Popen(command, stdout=output)
@@ -49,12 +46,12 @@ def run_process(*words: str, python: str = sys.executable) -> Process:
 
 
 def median(values: Sequence[float], digits: int = 1) -> float:
-    """Their median, rounded."""
+    """Returns the median, rounded to so many digits."""
     return round(statistics.median(values), digits)
 
 
 def versions(packages: Sequence[str]) -> list[str]:
-    """Those of `packages` that are installed, with their versions."""
+    """Returns name and version of each of the packages that is installed."""
     found = []
     for package in packages:
         try:
@@ -65,7 +62,7 @@ def versions(packages: Sequence[str]) -> list[str]:
 
 
 def machine() -> str:
-    """This machine and what runs on it, in one line."""
+    """Returns one line with the processor and the versions of Python and the packages."""
     model = platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():
@@ -75,36 +72,30 @@ def machine() -> str:
     return ", ".join(parts + versions(_PACKAGES))
 
 
-def best_mean_return(score: kp.Score) -> float:
-    """The best possible mean return on a score's starts.
-
-    CartPole's is all that an episode can give, as soon as one policy reaches it.
-    """
-    if TASKS[score.environment].has_torque:
-        return score.optimal_mean_return
-    return float(TASKS[score.environment].steps_per_episode)
-
-
 def markdown(rows: Sequence[Row]) -> str:
-    """A Markdown table; the keys of the first row are its head."""
-    head = list(rows[0])
-    lines = [head, ["---"] * len(head), *([row[key] for key in head] for row in rows)]
+    """Returns a Markdown table; its header is the keys of the first row."""
+    header = list(rows[0])
+    lines = [header, ["---"] * len(header), *([row[key] for key in header] for row in rows)]
     return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
 
 
 def write(name: str, command: str, rows: Sequence[Row], *, also: Sequence[str] = ()) -> str:
     """Writes the rows as JSON and Markdown to benchmarks/results; returns the Markdown table.
 
-    `also` are packages, with versions, that took part beside the ones in this environment.
+    Args:
+        name: of the two files.
+        command: the command that measured the rows.
+        rows: all with the same keys.
+        also: further packages with their versions, in this environment or in that of a peer.
     """
     RESULTS.mkdir(exist_ok=True)
-    where = ", ".join([machine(), *also])
-    content = {"command": command, "machine": where, "rows": list(rows)}
+    setup = ", ".join([machine(), *also])
+    content = {"command": command, "machine": setup, "rows": list(rows)}
     (RESULTS / f"{name}.json").write_text(
         json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
     )
     table = markdown(rows)
-    text = f"`{command}`\n\n{table}\n{where}.\n"
+    text = f"`{command}`\n\n{table}\n{setup}.\n"
     (RESULTS / f"{name}.md").write_text(text, encoding="utf-8")
     print(text)
     return table

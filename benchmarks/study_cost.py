@@ -1,35 +1,36 @@
-"""What a study costs beyond its training, and what a second worker gains.
+"""The cost of a study beyond its training, and the gain of a second worker.
 
     python -m benchmarks.study_cost [ROUNDS [RUNS [EPISODES]]]
 
-Makes the same RUNS (4) runs of `reference` on one worker and on two, workers warm, as whole
-studies without the command: results are written and read like a user's. In turns, ROUNDS (5)
-times, because a shared machine is faster in one minute than in another; medians. With 500 episodes
-that takes eight minutes on two cores. Beside it stands what the machine itself gives to two
-processes that do nothing but multiply matrices of an update's size: where its cores share what they
-compute with, no study can do better.
+Makes the same RUNS (4) runs of `reference` on one worker and on two, as whole studies without the
+command: results are written and read as for a user. The workers have made a run before. Both take
+turns, ROUNDS (5) times, because a shared machine is faster in one minute than in another; the table
+has the medians. With 500 episodes that takes eight minutes on two cores. For comparison, two
+processes multiply matrices of the size of an update: no study can be more efficient than that.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import statistics
 import sys
 import tempfile
 import time
-from concurrent.futures import wait
+from concurrent.futures import ProcessPoolExecutor, wait
 from pathlib import Path
 
 import keras_pendulum as kp
 from benchmarks.report import Row, median, write
-from keras_pendulum.arms import Arm
-from keras_pendulum.study_folder import StudyFolder
-from keras_pendulum.study_loop import Engine, run_all
-from keras_pendulum.study_run import train_and_score
-from keras_pendulum.worker_processes import WorkerProcesses
+from keras_pendulum.study.arms import Arm
+from keras_pendulum.study.dask_workers import local_workers
+from keras_pendulum.study.job import train_and_score
+from keras_pendulum.study.results_folder import ResultsFolder
+from keras_pendulum.study.runner import run_all
+from keras_pendulum.tensorflow_setup import use_one_thread
 
 
 def multiply(times: int) -> None:
-    """Matrix products of the widest layer's size, on one thread."""
+    """Multiplies matrices of the widest layer's size."""
     import numpy as np
 
     features, kernel = np.ones((32, 512), np.float32), np.ones((512, 256), np.float32)
@@ -38,59 +39,60 @@ def multiply(times: int) -> None:
 
 
 def machine_efficiency(workers: int) -> float:
-    """How fast each of so many processes multiplies beside the others, against one alone."""
-    with WorkerProcesses(workers) as executor:
+    """Returns the speed of each of several multiplying processes, relative to one alone."""
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, spawn, use_one_thread) as executor:
 
         def seconds(processes: int) -> float:
             started = time.perf_counter()
             wait([executor.submit(multiply, 20_000) for _ in range(processes)])
             return time.perf_counter() - started
 
-        seconds(workers)  # starts them
+        seconds(workers)  # starts the processes
         return statistics.median(seconds(1) / seconds(workers) for _ in range(5))
 
 
-def measured(workers: int, runs: int, episodes: int) -> Row:
-    """A row for a study on so many workers, each of which has made a run before."""
+def measure(workers: int, runs: int, episodes: int) -> Row:
+    """Returns a row for a study on so many workers."""
     warm = Arm("warm", kp.preset("reference", episodes=42))
     arm = Arm("reference", kp.preset("reference", episodes=episodes))
-    with WorkerProcesses(workers) as executor, tempfile.TemporaryDirectory() as out:
-        engine = Engine(executor, workers, lambda: workers)
-        first = StudyFolder(Path(out) / "warm", [warm], workers)
-        started = time.perf_counter()
-        outcomes = [ended.outcome for ended in run_all(engine, train_and_score, first.jobs())]
-        useful = sum(each.training + each.evaluation for each in outcomes if each)
+    started = time.perf_counter()
+    with local_workers(workers) as client, tempfile.TemporaryDirectory() as out:
+        client.wait_for_workers(workers)
+        warm_jobs = ResultsFolder(Path(out) / "warm", [warm], workers).jobs()
+        replies = [finished.reply for finished in run_all(client, train_and_score, warm_jobs)]
+        useful = sum(reply.training + reply.evaluation for reply in replies if reply)
         start = time.perf_counter() - started - useful / workers
-        folder = StudyFolder(Path(out) / "study", [arm], runs)
-        training = evaluation = inside = 0.0
-        with folder.opened():
+        folder = ResultsFolder(Path(out) / "study", [arm], runs)
+        training = evaluation = in_worker = 0.0
+        with folder.create_and_lock():
             begun = time.perf_counter()
-            for job, outcome, problem in run_all(engine, train_and_score, folder.missing()):
-                if outcome is None:
+            for job, reply, problem in run_all(client, train_and_score, folder.missing_jobs()):
+                if reply is None:
                     raise RuntimeError(problem)
-                folder.keep(job, outcome)
-                training += outcome.training
-                evaluation += outcome.evaluation
-                inside += outcome.total
+                folder.save(job, reply)
+                training += reply.training
+                evaluation += reply.evaluation
+                in_worker += reply.total
             seconds = time.perf_counter() - begun
     return {
         "workers": workers,
         "runs": runs,
         "seconds": seconds,
-        "seeds per core-hour": 3600 * runs / (seconds * workers),
-        "efficiency": 0.0,  # against one worker in the same minute
-        "of bare matrix products": machine_efficiency(workers),
-        "training (s a run)": training / runs,
-        "evaluation (s a run)": evaluation / runs,
-        "all else (s a run)": (seconds * workers - training - evaluation) / runs,
-        "of it in the worker (s a run)": (inside - training - evaluation) / runs,
-        "a worker's start (s, once)": start,
+        "runs per core-hour": 3600 * runs / (seconds * workers),
+        "efficiency": 0.0,  # relative to one worker in the same round
+        "efficiency of matrix products": machine_efficiency(workers),
+        "training (s per run)": training / runs,
+        "evaluation (s per run)": evaluation / runs,
+        "overhead (s per run)": (seconds * workers - training - evaluation) / runs,
+        "overhead in the worker (s per run)": (in_worker - training - evaluation) / runs,
+        "start of a worker (s, once)": start,
     }
 
 
 def main(rounds: int = 5, runs: int = 4, episodes: int = 500) -> None:
     """Measures with one worker and with two, in turns, and writes the table."""
-    pairs = [[measured(workers, runs, episodes) for workers in (1, 2)] for _ in range(rounds)]
+    pairs = [[measure(workers, runs, episodes) for workers in (1, 2)] for _ in range(rounds)]
     for alone, both in pairs:
         alone["efficiency"], both["efficiency"] = 1.0, alone["seconds"] / (2 * both["seconds"])
     rows: list[Row] = [
