@@ -1,4 +1,4 @@
-"""What every test stands on: the recorded run, and the commands as a person starts them."""
+"""Fixtures of several rooms: the recorded run, and commands as a user starts them."""
 
 from __future__ import annotations
 
@@ -14,57 +14,50 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.environment import STEPS_PER_EPISODE, make_environment
-from keras_pendulum.replay import ReplayBuffer
-from keras_pendulum.torque import TorqueGrid
+from keras_pendulum.dqn.replay_buffer import ReplayBuffer, Transitions
+from keras_pendulum.environments.actions import TorqueGrid
+from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environment
 
 if TYPE_CHECKING:
     import keras_pendulum as kp
 
-DATA = Path(__file__).parent / "data"
+TESTS = Path(__file__).parent
+ROOT = TESTS.parent
+DATA = TESTS / "data"
+# `pytest -m quick` runs the tests of these rooms: no training over 5 s, no browser, no build.
+QUICK_ROOMS = ("dqn", "config", "environments", "storage")
 Recorded = dict[str, NDArray[Any]]
 Command = Callable[..., subprocess.CompletedProcess[str]]
 Refusal = Callable[[Callable[[list[str]], int], Sequence[object]], str]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks the quick tests."""
+    for item in items:
+        if item.path.parent.name in QUICK_ROOMS and not item.get_closest_marker("slow"):
+            item.add_marker("quick")
+
+
 @pytest.fixture(scope="session")
 def recorded() -> Recorded:
-    """The complete run of the original under Keras 2.15, every draw seeded by 1."""
+    """The arrays of the recorded run of the original under Keras 2.15, with seed 1."""
     with np.load(DATA / "original_run_seed1.npz") as arrays:
         return dict(arrays)
 
 
 @pytest.fixture(scope="session")
-def recorded_memory(recorded: Recorded) -> ReplayBuffer:
-    """Every transition of the recorded run, at its step number: its actions, played again."""
-    memory = ReplayBuffer(len(recorded["action_index"]))
+def recorded_transitions(recorded: Recorded) -> Transitions:
+    """All transitions [100000] of the recorded run, made by taking its actions again."""
+    replay = ReplayBuffer(len(recorded["action_index"]))
     env = make_environment("Pendulum-v1", gravity=1.0)
     torques = TorqueGrid(41)
     for step, action in enumerate(recorded["action_index"].tolist()):
         if step % STEPS_PER_EPISODE == 0:
             observation, _ = env.reset(seed=1 if step == 0 else None)
-        following, reward, terminated, _, _ = env.step(torques.control(action))
-        memory.add(observation, action, float(reward), following, terminated)
-        observation = following
-    return memory
-
-
-@pytest.fixture(scope="session")
-def recorded_lines() -> list[str]:
-    """What that run printed."""
-    return (DATA / "original_run_seed1.log").read_text().splitlines()
-
-
-@pytest.fixture(scope="session")
-def recorded_initial_weights(recorded: Recorded, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A weights file with the network that the recorded run started from."""
-    import keras_pendulum as kp
-
-    network = kp.DQN()
-    network.set_weights([recorded[f"initial_weight_{i}"] for i in range(8)])
-    path = tmp_path_factory.mktemp("recorded") / "initial.h5"
-    kp.save_weights(network, path)
-    return path
+        next_observation, reward, terminated, _, _ = env.step(torques.to_env_action(action))
+        replay.add(observation, action, float(reward), next_observation, terminated)
+        observation = next_observation
+    return Transitions(**replay.get_state())
 
 
 @pytest.fixture
@@ -93,17 +86,17 @@ def command(tmp_path: Path) -> Command:
 def refusal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Refusal:
-    """The one line that a command's `main` says to words it must refuse.
+    """Returns the one line that a command's `main` prints for arguments that it refuses.
 
-    It is called in a folder with a file `text.h5`, which it must leave as it is.
+    The command runs in a folder with a file `text.h5`, which it must not change.
     """
     (tmp_path / "text.h5").write_text("not weights")
     monkeypatch.chdir(tmp_path)
 
-    def told(main: Callable[[list[str]], int], words: Sequence[object]) -> str:
+    def error_line(main: Callable[[list[str]], int], words: Sequence[object]) -> str:
         try:
             status = main([str(word) for word in words])
-        except SystemExit as exit:  # argparse leaves by itself
+        except SystemExit as exit:  # raised by argparse
             assert isinstance(exit.code, int)
             status = exit.code
         printed = capsys.readouterr()
@@ -114,25 +107,25 @@ def refusal(
         assert (tmp_path / "text.h5").read_text() == "not weights"
         return printed.err
 
-    return told
+    return error_line
 
 
 def without_gpu_note(output: str) -> str:
-    """What a process printed, but for the note of the whole tensorflow package: it finds no GPU.
+    """Removes the note of the package `tensorflow` that there is no GPU.
 
-    Keras 2 brings that package into the tests' environment; tensorflow-cpu is silent
-    (tests/test_packaging.py).
+    Keras 2 installs that package in the tests' environment. tensorflow-cpu prints no note
+    (tests/project/test_packaging.py).
     """
     return re.sub(r"^(WARNING: All log messages|I\d{4} ).*\n", "", output, flags=re.M)
 
 
 def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]:
-    """The words that start a command of the package in this interpreter."""
+    """Returns the words that start a command of the package in this interpreter."""
     return [sys.executable, "-m", f"keras_pendulum.{name}", *map(str, arguments)]
 
 
 def comparable(result: kp.TrainingResult) -> list[tuple[float, ...]]:
-    """The history but for its wall-clock times."""
+    """Returns the history without its wall-clock times."""
     return [
         tuple(-1.0 if np.isnan(value) else value for value in record[:-1])
         for record in result.history

@@ -1,0 +1,497 @@
+"""The commands as a user types them, with right and wrong arguments."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import pty
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+import pandas
+import pytest
+import tensorflow as tf
+from conftest import DATA, Command, Refusal, command_line, without_gpu_note
+from PIL import Image, ImageSequence
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+import keras_pendulum as kp
+from keras_pendulum.evaluate import __main__ as evaluate
+from keras_pendulum.train import __main__ as train
+from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint
+from keras_pendulum.train.run import Run
+
+RECORDED = DATA / "pendulum_weight.keras2.h5"
+
+
+@pytest.fixture
+def in_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Command:
+    """Runs a command as `command` does, but in this process, which is much faster."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(name: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+        words = [str(argument) for argument in arguments]
+        status = {"train": train.main, "evaluate": evaluate.main}[name](words)
+        printed = capsys.readouterr()
+        return subprocess.CompletedProcess(words, status, printed.out, printed.err)
+
+    return run
+
+
+@pytest.mark.parametrize("name", ["train", "evaluate", "play", "page", "study"])
+def test_help_imports_no_heavy_package(name: str) -> None:
+    code = (
+        "import runpy, sys\n"
+        f"sys.argv = ['{name}', '--help']\n"
+        "try:\n"
+        f"    runpy.run_module('keras_pendulum.{name}', run_name='__main__')\n"
+        "except SystemExit as exit:\n"
+        "    assert exit.code == 0\n"
+        "heavy = {'tensorflow', 'keras', 'gymnasium', 'matplotlib', 'h5py', 'numpy'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "usage: python -m keras_pendulum." in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("train --pres", {"--preset"}),
+        ("train --loss ", {"squared", "huber"}),
+        ("evaluate --gi", {"--gif"}),
+        ("play --ag", {"--against"}),
+        ("page --o", {"--out", "--open"}),
+    ],
+)
+def test_shell_completes_flags(typed: str, offered: set[str], tmp_path: Path) -> None:
+    # The variables that argcomplete's shell functions set.
+    line = f"python -m keras_pendulum.{typed}"
+    name = typed.split()[0]
+    file = tmp_path / "completions"
+    variables = {
+        "_ARGCOMPLETE": "3",
+        "_ARGCOMPLETE_IFS": "\n",
+        "_ARGCOMPLETE_STDOUT_FILENAME": str(file),
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+    }
+    subprocess.run(command_line(name), env=os.environ | variables, capture_output=True, check=True)
+    assert {word.strip() for word in file.read_text().split("\n")} == offered
+    source = (Path(kp.__file__).parent / name / "__main__.py").read_text()
+    assert "PYTHON_ARGCOMPLETE_OK" in source[:1024]  # the shell looks for it
+
+
+def test_every_setting_is_a_flag_with_a_help_text() -> None:
+    done = subprocess.run(
+        command_line("train", "--help"),
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "COLUMNS": "300"},
+    )
+    output = " ".join(done.stdout.split())
+    for name, spec in kp.Config.__dataclass_fields__.items():
+        assert f"--{name.replace('_', '-')}" in output
+        assert name == "preset" or spec.metadata["help"] in output
+
+
+def test_train_prints_one_line_per_episode_and_the_score(
+    command: Command, in_process: Command, tmp_path: Path
+) -> None:
+    done = command("train", "--episodes", "3", "--seed", "4", "--hidden-units", "16,8")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    lines = done.stdout.splitlines()
+    assert [line.split(",")[0] for line in lines[:3]] == [f"Episode: {i}" for i in range(3)]
+    assert "best possible" in done.stdout.lower()
+    assert "Greedy on 100 fixed starts" in done.stdout
+    assert "Regret: " in done.stdout
+    assert "random actions on the same starts: -920.87" in done.stdout
+    folder = tmp_path / "runs" / "reference-seed4"
+    assert (folder / "pendulum_weight.h5").exists()
+    assert kp.load_weights(folder / "pendulum_weight.h5").hidden_units == (16, 8)
+
+    again = in_process("train", "--episodes", "3", "--seed", "4", "--hidden-units", "16,8")
+    assert (again.returncode, again.stdout) == (2, "")
+    assert again.stderr.count("\n") == 1
+    assert again.stderr.startswith(f"error: {Path('runs') / 'reference-seed4'} already holds a run")
+
+    longer = in_process("train", "--resume", "--seed", "4", "--episodes", "5")
+    assert longer.returncode == 0, longer.stderr
+    assert longer.stdout.startswith("Episode: 3,")
+    clash = in_process("train", "--resume", "--seed", "4", "--gravity", "3")
+    assert (clash.returncode, clash.stderr.count("\n")) == (2, 1)
+    assert "this run has gravity 1.0, not 3.0" in clash.stderr
+
+
+def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
+    controller, terminal = pty.openpty()
+    termios.tcsetwinsize(terminal, (24, 80))
+    arguments = ["--preset", "original", "--episodes", "43", "--hidden-units", "8"]
+    with subprocess.Popen(
+        command_line("train", *arguments), cwd=tmp_path, stdout=terminal, close_fds=True
+    ) as process:
+        os.close(terminal)
+        output = b""
+        try:
+            while chunk := os.read(controller, 4096):
+                output += chunk
+        except OSError:  # raised by Linux when the other end is closed
+            pass
+    os.close(controller)
+    assert process.returncode == 0
+    bars, *closing = output.decode().replace("\r\n", "\n").split("\n")
+    shown = bars.replace("\x1b[K", "").split("\r")[1:]
+    assert all(len(line) < 80 for line in shown)  # a wrapped line is not drawn over
+    number = r"-?[\d.e-]+"
+    assert re.fullmatch(
+        rf"43/43 ━+ return {number} regret {number} ε 0.58 loss {number} \d+ steps/s 0:00 left",
+        shown[-1],
+    )
+    assert "Episode: " not in output.decode()
+    assert "Regret: " in "\n".join(closing)
+    # Each suggested command works.
+    offered = [line.split(": ", 1)[1] for line in closing if ": python -m" in line]
+    assert [line.split()[2] for line in offered] == [
+        f"keras_pendulum.{name}" for name in ("evaluate", "play", "page")
+    ]
+    assert all(shlex.split(line)[-1].endswith(".h5") or "render" in line for line in offered)
+
+
+def test_quiet_run_prints_only_the_closing_lines(in_process: Command) -> None:
+    done = in_process("train", "--preset", "original", "--episodes", "2", "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("Trained 2 episodes")
+    assert "Regret: " in done.stdout
+
+
+def test_pandas_reads_the_history(in_process: Command, tmp_path: Path) -> None:
+    done = in_process(
+        "train", "--preset", "original", "--episodes", "42", "--quiet", "--out", "run"
+    )
+    assert done.returncode == 0, done.stderr
+    table = pandas.read_csv(tmp_path / "run" / "history.csv")
+    assert list(table.episode) == list(range(42))
+    assert table["return"].between(-2000, 0).all()
+    assert table.loss.isna().sum() == 41
+    assert {kind.kind for kind in table.dtypes} == {"i", "f"}
+
+
+def test_tensorboard_shows_curves_and_phase_planes(in_process: Command, tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--out", "run", "--tensorboard"]
+    for episodes, more in ((43, ()), (52, ["--resume"])):
+        done = in_process("train", *words, "--episodes", str(episodes), *more)
+        assert done.returncode == 0, done.stderr
+    events = EventAccumulator(str(tmp_path / "run" / "tensorboard"), {"tensors": 0})
+    events.Reload()
+    with open(tmp_path / "run" / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for name, column in (("return", "return"), ("epsilon", "epsilon"), ("loss", "loss")):
+        logged = {
+            event.step: float(tf.make_ndarray(event.tensor_proto)) for event in events.Tensors(name)
+        }
+        wanted = {int(row["episode"]): float(row[column]) for row in rows if row[column]}
+        assert logged == pytest.approx(wanted, rel=1e-6)
+    maps = {event.step: event.tensor_proto.string_val for event in events.Tensors("phase plane")}
+    assert list(maps) == [0, 42, 50, 51]
+    assert tf.io.decode_png(maps[51][2]).shape == (650, 900, 4)
+    done = in_process("train", *words[:-1], "--episodes", "2", "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "run" / "tensorboard").exists()  # no curves of another run
+
+
+def test_missing_tensorboard_is_one_error_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert train.main(["--tensorboard", "--out", str(tmp_path / "run")]) == 2
+    assert capsys.readouterr().err == (
+        "error: tensorboard is not installed: pip install tensorboard\n"
+    )
+    assert not (tmp_path / "run").exists()
+
+
+def test_evaluate_prints_the_score_of_evaluate_policy_each_time(command: Command) -> None:
+    first, second = (command("evaluate", RECORDED, "--episodes", "4", "--json") for _ in range(2))
+    assert first.returncode == 0, first.stderr
+    assert first.stdout == second.stdout
+    score = kp.evaluate_policy(kp.load_weights(RECORDED), 4)
+    assert json.loads(first.stdout) == {"weights": str(RECORDED), **score.as_json()}
+
+
+def test_evaluate_prints_a_summary(in_process: Command) -> None:
+    done = in_process("evaluate", RECORDED, "--episodes", "2", "--seed", "3", "--gravity", "10")
+    assert done.returncode == 0, done.stderr
+    assert "2 fixed starts, Pendulum-v1, g = 10" in done.stdout
+    assert "Regret: " in done.stdout
+
+
+@pytest.fixture
+def cartpole_file(tmp_path: Path) -> Path:
+    """An untrained CartPole network."""
+    config = kp.preset("cartpole-original", episodes=1)
+    path = tmp_path / "pole.h5"
+    kp.save_weights(kp.train_dqn(config).network, path)
+    return path
+
+
+def test_evaluate_recognises_cartpole_from_the_file(
+    in_process: Command, cartpole_file: Path
+) -> None:
+    printed = in_process("evaluate", cartpole_file, "--episodes", "5", "--json").stdout
+    result = json.loads(printed)
+    assert (result["environment"], result["gravity"]) == ("CartPole-v1", None)
+    assert 8 <= result["worst_return"] <= result["mean_return"] <= 500
+    assert result["optimal_mean_return"] is result["regret"] is None
+    summary = in_process("evaluate", cartpole_file, "--episodes", "5").stdout.splitlines()
+    assert summary[0].startswith("Greedy on 5 fixed starts, CartPole-v1: mean return ")
+    assert summary[1] == "Best possible on the same starts: 500.00"
+    assert summary[2] == f"Regret: {500 - result['mean_return']:.2f}"
+
+
+def test_pendulum_settings_are_refused_for_cartpole(
+    in_process: Command, cartpole_file: Path
+) -> None:
+    for words, message in (
+        (["evaluate", cartpole_file, "--gravity", "2"], "gravity belongs to Pendulum-v1"),
+        (
+            ["train", "--init", cartpole_file],
+            "has environment CartPole-v1, the settings say Pendulum-v1",
+        ),
+    ):
+        done = in_process(*words)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith("error: ")
+        assert message in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
+def test_gif_shows_the_first_episode(command: Command, tmp_path: Path) -> None:
+    for _ in range(2):  # the second film replaces the first
+        done = command("evaluate", RECORDED, "--episodes", "1", "--gif", "film.gif")
+    assert done.returncode == 0, done.stderr
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.size == (250, 250)
+        assert len(list(ImageSequence.Iterator(film))) > 50  # Pillow merges equal frames
+    assert done.stderr == ""
+    assert (tmp_path / "film.gif").stat().st_size < 500_000
+
+
+def test_gif_has_the_shape_and_speed_of_the_environment(
+    in_process: Command, tmp_path: Path
+) -> None:
+    assert (
+        in_process("evaluate", "cartpole", "--episodes", "1", "--gif", "film.gif").returncode == 0
+    )
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.size == (375, 250)
+        shown = sum(frame.info["duration"] for frame in ImageSequence.Iterator(film))
+    assert shown == pytest.approx(500 * 20, rel=0.03)  # ms
+
+
+def test_gif_depends_on_start_and_gravity(in_process: Command, tmp_path: Path) -> None:
+    films = set()
+    for words in ([], ["--seed", "3"], ["--gravity", "10"]):
+        done = in_process("evaluate", RECORDED, "--episodes", "1", "--gif", "film.gif", *words)
+        assert done.returncode == 0
+        films.add((tmp_path / "film.gif").read_bytes())
+    assert len(films) == 3
+
+
+def test_render_works_with_a_dummy_display(command: Command) -> None:
+    done = command(
+        "evaluate",
+        RECORDED,
+        "--episodes",
+        "1",
+        "--render",
+        environment={"SDL_VIDEODRIVER": "dummy"},
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_render_without_a_display_is_one_error_line(command: Command) -> None:
+    nothing = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
+    done = command("evaluate", RECORDED, "--episodes", "1", "--render", environment=nothing)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "error: there is no display to open a window on\n"
+
+
+WRONG = [
+    (["train", "--preset", "nonsense"], "unknown preset 'nonsense'"),
+    (["train", "--episodes", "-5"], "episodes is -5"),
+    (["train", "--episodes", "ten"], "episodes is 'ten'; expected a whole number"),
+    (["train", "--gravity", "nan"], "gravity is nan"),
+    (["train", "--learning-rate", "inf"], "learning_rate is inf"),
+    (["train", "--double-q", "yes"], "double_q is 'yes'; expected true or false"),
+    (["train", "--loss", "cubed"], "invalid choice: 'cubed'"),
+    (["train", "--update-after", "reset"], "the setting update_after is now train_frequency"),
+    (
+        ["train", "--hidden-units", "8,,8"],
+        "hidden_units is '8,,8'; expected a list of whole numbers",
+    ),
+    (["train", "--batch-size", "999999999"], "batch_size is 999999999"),
+    (["train", "--colour", "red"], "unrecognized arguments: --colour red"),
+    (["train", "--resume", "--overwrite"], "not allowed with"),
+    (["train", "--resume"], "no such file"),
+    (["train", "--out", ""], "the name is empty"),
+    (["train", "--preset", ""], "the name is empty"),
+    (["train", "--init", "n" * 300], "File name too long"),
+    (["train", "--out", "n" * 300], "File name too long"),
+    (["train", "--init", "missing.h5"], "missing.h5: no such file"),
+    (["train", "--init", "text.h5"], "text.h5: not an HDF5 file"),
+    (["train", "--init", RECORDED, "--hidden-units", "8"], "layers 512-256-128-41"),
+    (["train", "--preset", "cartpole-original", "--init", RECORDED], "has environment Pendulum-v1"),
+    (["train", "--preset", "cartpole-original", "--gravity", "1"], "gravity 1.0 belongs to"),
+    (["train", "--environment", "CartPole-v1"], "gravity 1.0 belongs to Pendulum-v1; CartPole-v1"),
+    (["train", "--out", "text.h5"], "cannot make the folder text.h5"),
+    (["train", "--out", "/proc/nowhere"], "cannot make the folder /proc/nowhere"),
+    (["evaluate"], "the following arguments are required: WEIGHTS.h5"),
+    (["evaluate", "missing.h5"], "missing.h5: no such file"),
+    (["evaluate", "text.h5"], "text.h5: not an HDF5 file"),
+    (["evaluate", "n" * 300], "File name too long"),
+    (["evaluate", RECORDED, "--gif", "text.h5"], "text.h5 holds something else than a GIF"),
+    (["evaluate", RECORDED, "--gif", "n" * 300], "File name too long"),
+    (["evaluate", RECORDED, "--episodes", "0"], "episodes is 0"),
+    (["evaluate", RECORDED, "--seed", "-1"], "seed is -1"),
+    (["evaluate", RECORDED, "--gravity", "nan"], "gravity is nan"),
+    (["train", "--live", "--render"], "not allowed with"),
+    (["evaluate", RECORDED, "--episodes", "1", "--gif", "no/such/folder.gif"], "cannot write"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), WRONG, ids=lambda value: str(value)[:60])
+def test_wrong_arguments_are_one_error_line(
+    words: list[str], message: str, refusal: Refusal
+) -> None:
+    main = {"train": train.main, "evaluate": evaluate.main}[words[0]]
+    assert message in refusal(main, words[1:])
+
+
+@pytest.mark.parametrize(
+    "words", [["train"], ["evaluate", str(RECORDED)]], ids=["train", "evaluate"]
+)
+def test_other_keras_backend_is_one_error_line(words: list[str], command: Command) -> None:
+    done = command(*words, environment={"KERAS_BACKEND": "torch"})
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: KERAS_BACKEND is 'torch', but this package runs on TensorFlow: unset it\n"
+    )
+
+
+def test_public_names_exist_and_dir_lists_them() -> None:
+    assert all(getattr(kp, name) is not None for name in kp.__all__)
+    assert dir(kp) == sorted(kp.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        kp.nonsense  # noqa: B018
+
+
+def test_first_control_c_stops_after_the_episode_and_second_at_once() -> None:
+    with train._Interrupt() as interrupt:
+        signal.raise_signal(signal.SIGINT)
+        assert interrupt.asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
+def test_sigint_stops_a_run_in_the_background() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with train._Interrupt() as interrupt:
+            signal.raise_signal(signal.SIGINT)
+        assert interrupt.asked
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_control_c_after_the_last_episode_saves_the_run_and_skips_evaluation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save = CheckpointWriter.save
+
+    def interrupted(writer: CheckpointWriter, run: Run) -> None:
+        if len(run.history) == 5:
+            signal.raise_signal(signal.SIGINT)
+        save(writer, run)
+
+    monkeypatch.setattr(CheckpointWriter, "save", interrupted)
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "5", "--quiet"]
+    assert train.main([*words, "--out", str(tmp_path)]) == 130
+    shown = capsys.readouterr().out
+    assert "Trained 5 episodes" in shown
+    assert "Greedy" not in shown
+    config = kp.preset("original", hidden_units=(8,), episodes=5)
+    assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 5
+    assert (tmp_path / "rewards.png").exists()
+
+
+LATIN_1 = {**os.environ, "PYTHONIOENCODING": "latin-1"}
+
+
+def test_progress_bar_in_latin_1_replaces_unknown_characters(tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
+    controller, terminal = pty.openpty()
+    done = subprocess.run(
+        command_line("train", *words),
+        cwd=tmp_path,
+        env=LATIN_1,
+        stdout=terminal,
+        stderr=subprocess.PIPE,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"?" in os.read(controller, 2**16)
+    os.close(controller)
+    os.close(terminal)
+
+
+def test_help_in_latin_1_replaces_unknown_characters() -> None:
+    done = subprocess.run(command_line("train", "--help"), env=LATIN_1, capture_output=True)
+    assert done.returncode == 0, done.stderr
+    assert b"?" in done.stdout
+
+
+def redirected(to: str, *words: str, folder: Path) -> tuple[int, str]:
+    """Returns exit status and stderr of a command whose output the shell redirects."""
+    done = subprocess.run(
+        ["sh", "-c", f'exec "$@" {to}', "sh", *command_line(*words)],
+        cwd=folder,
+        # Buffered output, so that the last write fails.
+        env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return done.returncode, without_gpu_note(done.stderr)
+
+
+def test_closed_output_does_not_stop_training(tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
+    assert redirected(">&-", "train", *words, folder=tmp_path) == (0, "")
+    assert (tmp_path / "run" / "rewards.png").exists()
+
+
+def test_full_disk_of_the_output_is_one_error_line(tmp_path: Path) -> None:
+    result = redirected(">/dev/full", "evaluate", "original", folder=tmp_path)
+    assert result == (2, "error: [Errno 28] No space left on device\n")
+
+
+def test_line_break_in_an_argument_does_not_break_the_error_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        train.main(["--foo\nbar"])
+    assert evaluate.main(["some\nfile"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 2

@@ -1,0 +1,170 @@
+"""The flags of the settings: what a user types, and what `--help` prints."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from typing import Any
+
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.cli import OneLineParser
+from keras_pendulum.config.config import RENAMED, Config, parse_setting
+from keras_pendulum.config.fields import format_value
+from keras_pendulum.config.flags import add_config_flags, settings_from_args
+from keras_pendulum.config.presets import PRESETS
+
+SETTINGS = [spec.name for spec in fields(Config) if spec.name != "preset"]
+
+
+def flag(setting: str) -> str:
+    return f"--{setting.replace('_', '-')}"
+
+
+def make_parser() -> OneLineParser:
+    parser = OneLineParser()
+    add_config_flags(parser)
+    return parser
+
+
+def typed(*words: str) -> dict[str, Any]:
+    return settings_from_args(make_parser().parse_args(list(words)))
+
+
+def error_line(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    """Returns the one line that is printed for words that are refused."""
+    with pytest.raises(SystemExit) as exit:
+        typed(*words)
+    printed = capsys.readouterr()
+    assert (exit.value.code, printed.out) == (2, "")
+    assert printed.err.count("\n") == 1
+    return printed.err.removesuffix("\n")
+
+
+@pytest.fixture
+def help_lines(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """The help text of each flag, on one line."""
+    monkeypatch.setenv("COLUMNS", "1000")  # no line breaks within a help text
+    _, *flags = make_parser().format_help().split("\n  --")
+    return {f"--{text.split()[0]}": " ".join(text.split()) for text in flags}
+
+
+def test_flags_that_are_not_typed_stay_unset() -> None:
+    assert typed() == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("gradient_clip", "none", None),
+        ("gradient_clip", "5", 5.0),
+        ("gravity", "none", None),
+        ("discount", "1e-1", 0.1),
+        ("hidden_units", "16,8", (16, 8)),
+        ("seed", "7", 7),
+        ("loss", "huber", "huber"),
+        ("double_q", "true", True),
+        ("double_q", "false", False),
+    ],
+)
+def test_flag_and_text_give_the_same_value(name: str, text: str, value: object) -> None:
+    assert typed(flag(name), text) == {name: value}
+    assert parse_setting(name, text) == value
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_every_setting_of_every_preset_can_be_typed(name: str) -> None:
+    for config in PRESETS.values():
+        value = getattr(config, name)
+        found = typed(flag(name), format_value(value))
+        assert found == {name: value}
+        assert type(found[name]) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line"),
+    [
+        ("discount", "none", "error: discount is 'none'; expected a number"),
+        ("episodes", "none", "error: episodes is 'none'; expected a whole number"),
+        ("double_q", "True", "error: double_q is 'True'; expected true or false"),
+        ("hidden_units", "8;4", "error: hidden_units is '8;4'; expected a list of whole numbers"),
+    ],
+)
+def test_text_of_another_kind_is_refused_in_one_line(
+    name: str, text: str, line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert error_line(capsys, flag(name), text) == line
+
+
+def test_unknown_choice_is_refused_with_the_choices(capsys: pytest.CaptureFixture[str]) -> None:
+    line = error_line(capsys, "--target-update", "sometimes")
+    assert line.startswith("error: argument --target-update: invalid choice: 'sometimes'")
+    assert re.search("soft.*hard.*none", line)
+
+
+def test_old_flag_is_refused_with_the_new_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert error_line(capsys, "--update-after", "episode") == (
+        "error: the setting update_after is now train_frequency (episode or step)"
+    )
+
+
+@pytest.mark.parametrize("name", RENAMED)
+def test_every_old_flag_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    line = f"error: the setting {name} is now {RENAMED[name]}"
+    assert error_line(capsys, flag(name), "1") == line
+    assert error_line(capsys, f"{flag(name)}=none") == line
+
+
+def test_help_lists_the_settings_without_the_old_names(help_lines: dict[str, str]) -> None:
+    assert set(help_lines) == {flag(name) for name in SETTINGS}
+
+
+@pytest.mark.parametrize(
+    ("name", "defaults"),
+    [
+        ("episodes", "[reference: 500, cartpole-original: 600]"),
+        ("replay_capacity", "[reference: 25000, original: 8000, cartpole-original: 10000]"),
+        ("gravity", "[reference: 1.0, cartpole-original: none]"),
+        ("hidden_units", "[reference: 512,256,128, cartpole-original: 128,128]"),
+        ("updates_per_episode", "[reference: 30, original: 1]"),
+        ("target_update", "[reference: soft, original: none]"),
+        ("double_q", "[reference: false]"),
+        ("seed", "[reference: 0]"),
+    ],
+)
+def test_help_shows_the_defaults_of_the_reference_and_of_the_originals(
+    name: str, defaults: str, help_lines: dict[str, str]
+) -> None:
+    assert help_lines[flag(name)].endswith(f" {defaults}")
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("loss", "{squared,huber}"),
+        ("double_q", "{true,false}"),
+        ("episodes", "N"),
+        ("hidden_units", "N"),
+    ],
+)
+def test_help_shows_the_values_of_a_setting(
+    name: str, values: str, help_lines: dict[str, str]
+) -> None:
+    assert help_lines[flag(name)].split()[1] == values
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_help_of_every_setting_has_its_text_and_the_default(
+    name: str, help_lines: dict[str, str]
+) -> None:
+    line = help_lines[flag(name)]
+    assert Config.__dataclass_fields__[name].metadata["help"] in line
+    assert f"[reference: {format_value(getattr(PRESETS['reference'], name))}" in line
+
+
+def test_a_value_out_of_range_is_refused_by_the_config() -> None:
+    settings = typed("--episodes", "0")
+    assert settings == {"episodes": 0}
+    with pytest.raises(kp.ConfigError, match=r"^episodes is 0; expected a whole number from 1"):
+        kp.preset("reference", **settings)

@@ -1,0 +1,109 @@
+"""The presets: the numbers of the originals, and how a preset is changed."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.presets import PRESETS
+
+# The settings of version 0.1 that have other names now, and the line that names the new ones.
+RENAMED = {
+    "update_after": "the setting update_after is now train_frequency (episode or step)",
+    "learning_starts": ("the setting learning_starts is now warmup_episodes (learning_starts + 1)"),
+    "target_blend": "the setting target_blend is now tau",
+    "bootstrap": "the setting bootstrap is now double_q (true or false)",
+    "episode_steps": "the setting episode_steps is now max_episode_steps",
+    "remembered_action": ("the setting remembered_action is now stored_index (exact or truncated)"),
+}
+
+
+def test_original_has_the_numbers_of_the_final_listing() -> None:
+    config = kp.preset("original")
+    assert config.hidden_units == (512, 256, 128)
+    assert (config.gravity, config.episodes, config.torque_count) == (1.0, 500, 41)
+    assert (config.replay_capacity, config.batch_size, config.discount) == (8000, 32, 0.9)
+    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.99, 0.01)
+    assert (config.train_frequency, config.warmup_episodes) == ("episode", 41)
+    assert (config.updates_per_episode, config.total_updates) == (1, 459)
+    assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "constant")
+    assert (config.optimizer, config.optimizer_epsilon, config.loss) == ("adam", 1e-7, "squared")
+    assert (config.target_update, config.stored_index) == ("none", "exact")
+
+
+def test_walkthrough_has_the_numbers_of_the_step_by_step_listing() -> None:
+    config = kp.preset("walkthrough")
+    assert config.hidden_units == (128, 64, 32)
+    assert (config.replay_capacity, config.batch_size, config.episodes) == (4000, 64, 400)
+    assert (config.warmup_episodes, config.updates_per_episode) == (41, 1)
+    assert (config.target_update, config.stored_index) == ("none", "truncated")
+
+
+def test_reference_is_the_default_and_has_no_defect() -> None:
+    assert kp.preset() == kp.preset("reference") == Config()
+    assert Config().target_update != "none"
+    assert Config().stored_index == "exact"
+    assert Config().total_updates == 30 * 459
+    assert Config().train_frequency == "episode"
+
+
+def test_swingup_is_the_reference_on_the_standard_task() -> None:
+    config = kp.preset("swingup")
+    assert (config.gravity, config.double_q, config.discount) == (10.0, False, 0.98)
+    assert (config.hidden_units, config.torque_count) == ((512, 256, 128), 41)
+
+
+def test_cartpole_original_has_the_numbers_of_the_notebooks() -> None:
+    config = kp.preset("cartpole-original")
+    assert (config.environment, config.gravity) == ("CartPole-v1", None)
+    assert (config.episodes, config.max_episode_steps) == (600, 500)
+    assert (config.hidden_units, config.activation) == ((128, 128), "relu")
+    assert (config.replay_capacity, config.batch_size, config.discount) == (10_000, 128, 0.99)
+    assert (config.optimizer, config.learning_rate, config.weight_decay) == ("adamw", 1e-4, 0.01)
+    assert (config.loss, config.gradient_clip, config.double_q) == ("huber", 100, False)
+    assert (config.epsilon_schedule, config.epsilon_decay_steps) == ("steps", 1000)
+    assert (config.epsilon_start, config.epsilon_min) == (0.9, 0.05)
+    assert (config.train_frequency, config.learning_rate_schedule) == ("step", "constant")
+    assert (config.target_update, config.tau) == ("soft", 0.005)
+
+
+def test_cartpole_has_the_network_and_the_optimizer_of_the_notebooks() -> None:
+    tuned, original = kp.preset("cartpole"), kp.preset("cartpole-original")
+    for name in ("environment", "hidden_units", "activation", "loss", "optimizer", "discount"):
+        assert getattr(tuned, name) == getattr(original, name), name
+    assert tuned.double_q
+
+
+def test_presets_are_listed_under_their_own_names() -> None:
+    assert list(PRESETS) == [
+        *("reference", "original", "walkthrough", "swingup"),
+        *("cartpole-original", "cartpole"),
+    ]
+    assert all(config.preset == name for name, config in PRESETS.items())
+
+
+def test_changed_settings_leave_the_others_as_they_are() -> None:
+    config = kp.preset("original", seed=3, episodes=200)
+    assert (config.seed, config.episodes, config.preset) == (3, 200, "original")
+    assert config.replay_capacity == 8000
+    assert kp.preset("original").episodes == 500
+
+
+@pytest.mark.parametrize("name", ["nonsense", "", "Reference"])
+def test_unknown_preset_is_refused_with_the_names_of_the_presets(name: str) -> None:
+    with pytest.raises(kp.ConfigError, match=f"^unknown preset '{name}'.*reference, original"):
+        kp.preset(name)
+
+
+def test_unknown_setting_is_refused_by_name() -> None:
+    with pytest.raises(kp.ConfigError, match=r"^unknown setting learning_speed$"):
+        kp.preset("reference", learning_speed=1)
+
+
+@pytest.mark.parametrize("name", RENAMED)
+def test_old_name_of_a_setting_is_refused_with_the_new_one(name: str) -> None:
+    with pytest.raises(kp.ConfigError, match=f"^{re.escape(RENAMED[name])}$"):
+        kp.preset("reference", **{name: 1})

@@ -1,0 +1,110 @@
+"""The Q-network: its layers, its initial weights, its clone, and the run that it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import keras
+import numpy as np
+import pytest
+
+from keras_pendulum.dqn.network import DQN, Provenance
+
+
+def test_default_network_is_that_of_the_original() -> None:
+    network = DQN()
+    shapes = [(3, 512), (512,), (512, 256), (256,), (256, 128), (128,), (128, 41), (41,)]
+    assert [weights.shape for weights in network.get_weights()] == shapes
+    assert network.count_params() == 171_561
+    assert network(np.zeros((5, 3), np.float32)).shape == (5, 41)
+
+
+@pytest.mark.parametrize(
+    ("activation", "hidden"), [("tanh", np.tanh), ("relu", lambda x: max(x, 0))]
+)
+def test_q_values_are_those_computed_by_hand(
+    activation: str, hidden: Callable[[float], float]
+) -> None:
+    network = DQN((2,), 2, activation=activation)
+    kernel = [[1, -1], [0, 0], [0.5, 0]]
+    head = [[1, 2], [3, 4]]
+    network.set_weights([np.array(array) for array in (kernel, [0.25, 0], head, [10, 20])])
+    first, second = hidden(1 * 2 + 0.5 * -1 + 0.25), hidden(-1 * 2)
+    expected = [[10 + first + 3 * second, 20 + 2 * first + 4 * second]]
+    np.testing.assert_allclose(network(np.array([[2, 9, -1]], np.float32)), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("initial_weights", ["glorot", "fan-in"])
+def test_initial_weights_depend_on_the_seed_alone(initial_weights: str) -> None:
+    first = DQN((8, 8), seed=3, initial_weights=initial_weights)
+    keras.utils.set_random_seed(77)
+    again = DQN((8, 8), seed=3, initial_weights=initial_weights)
+    other = DQN((8, 8), seed=4, initial_weights=initial_weights)
+    for one, same, different in zip(
+        first.get_weights(), again.get_weights(), other.get_weights(), strict=True
+    ):
+        np.testing.assert_array_equal(one, same)
+        assert one.ndim == 1 or (one != different).any()
+
+
+def test_largest_seed_is_accepted() -> None:
+    assert np.isfinite(DQN((8,), seed=2**32 - 1).get_weights()[0]).all()
+
+
+def test_glorot_weights_are_uniform_and_biases_0() -> None:
+    weights = DQN((400, 300)).get_weights()
+    for kernel, bias in zip(weights[::2], weights[1::2], strict=True):
+        limit = np.sqrt(6 / sum(kernel.shape))
+        assert 0.99 * limit < abs(kernel).max() <= limit * (1 + 1e-6)
+        assert kernel.std() == pytest.approx(limit / np.sqrt(3), rel=0.05)
+        assert not bias.any()
+
+
+def test_fan_in_weights_and_biases_are_uniform() -> None:
+    weights = DQN((400, 300), initial_weights="fan-in").get_weights()
+    for kernel, bias in zip(weights[::2], weights[1::2], strict=True):
+        limit = len(kernel) ** -0.5
+        for array in (kernel, bias):
+            assert 0.9 * limit < abs(array).max() <= limit * (1 + 1e-6)
+        assert kernel.std() == pytest.approx(limit / np.sqrt(3), rel=0.05)
+
+
+def test_kernels_of_one_network_differ() -> None:
+    _, _, first, _, second, _, _, _ = DQN((8, 8, 8)).get_weights()
+    assert (first != second).all()
+
+
+def test_clone_has_equal_weights_and_its_own_variables() -> None:
+    provenance = Provenance("CartPole-v1", seed=3)
+    network = DQN((8, 4), 2, observation_size=4, activation="relu", seed=5, provenance=provenance)
+    clone = network.clone()
+    assert (clone.hidden_units, clone.action_count, clone.observation_size) == ((8, 4), 2, 4)
+    assert (clone.activation, clone.provenance) == ("relu", provenance)
+    before = network.get_weights()
+    for ours, theirs in zip(clone.get_weights(), before, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    clone.set_weights([weights + 1 for weights in before])
+    for ours, theirs in zip(network.get_weights(), before, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_network_computes_in_float32_whatever_the_users_keras_computes_in() -> None:
+    keras.config.set_floatx("float64")
+    keras.config.set_dtype_policy("float64")
+    try:
+        network = DQN((8,))
+    finally:
+        keras.config.set_floatx("float32")
+        keras.config.set_dtype_policy("float32")
+    assert {weights.dtype for weights in network.get_weights()} == {np.dtype(np.float32)}
+    assert network(np.zeros((1, 3), np.float32)).dtype == "float32"
+
+
+def test_variables_have_the_same_paths_in_every_network() -> None:
+    paths = [[variable.path for variable in DQN((8, 8)).weights] for _ in range(2)]
+    assert paths[0] == paths[1]
+    assert len(set(paths[0])) == 6
+
+
+def test_default_provenance_is_a_pendulum_of_unknown_origin() -> None:
+    assert DQN((8,)).provenance == Provenance("Pendulum-v1", None, None, None, None)

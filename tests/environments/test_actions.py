@@ -1,0 +1,100 @@
+"""The actions: indices, and the torques that they stand for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from keras_pendulum.environments.actions import (
+    DiscreteActions,
+    TorqueGrid,
+    TruncatingTorqueGrid,
+    make_actions,
+    require_torque,
+    truncated_index,
+)
+
+
+def test_grid_is_the_linspace_of_the_original() -> None:
+    grid = TorqueGrid(41)
+    np.testing.assert_array_equal(grid.torques, np.linspace(-2, 2, 41))
+    assert grid.count == 41
+
+
+@pytest.mark.parametrize("count", [2, 3, 41, 101])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_nearest_index_of_each_torque_is_its_index(count: int, dtype: type[np.floating]) -> None:
+    grid = TorqueGrid(count)
+    found = [
+        grid.nearest_index(float(dtype(grid.to_env_action(index)[0]))) for index in range(count)
+    ]
+    assert found == list(range(count))
+
+
+def test_torque_between_two_of_the_grid_gets_the_nearer_index() -> None:
+    grid = TorqueGrid(41)
+    assert grid.nearest_index(-1.96) == 0
+    assert grid.nearest_index(-1.94) == 1
+
+
+@pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 2.001])
+def test_torque_out_of_range_is_refused(torque: float) -> None:
+    for refuse in (TorqueGrid(41).nearest_index, require_torque):
+        with pytest.raises(ValueError, match=f"torque {torque} N·m; expected a number from -2 to"):
+            refuse(torque)
+
+
+def test_limits_of_the_torque_are_accepted() -> None:
+    for torque in (-2.0, 0.0, 2.0):
+        require_torque(torque)
+
+
+def test_environment_gets_a_float64_torque_of_shape_1() -> None:
+    torque = TorqueGrid(41).to_env_action(3)
+    assert torque.shape == (1,)
+    assert torque.dtype == np.float64
+    assert torque[0] == pytest.approx(-1.7)
+
+
+@pytest.mark.parametrize("actions", [TorqueGrid(5), DiscreteActions(5)])
+def test_stored_index_is_the_index(actions: TorqueGrid | DiscreteActions) -> None:
+    assert actions.count == 5
+    assert [actions.stored_index(index) for index in range(5)] == list(range(5))
+
+
+def test_discrete_actions_are_their_indices() -> None:
+    assert [DiscreteActions(2).to_env_action(index) for index in range(2)] == [0, 1]
+
+
+def test_truncating_grid_has_the_torques_of_the_walkthrough() -> None:
+    grid = TruncatingTorqueGrid()
+    assert [grid.to_env_action(index).item() for index in range(41)] == [
+        index / 10 - 2 for index in range(41)
+    ]
+
+
+def test_truncating_grid_stores_index_2_as_1_and_4_as_3() -> None:
+    grid = TruncatingTorqueGrid()
+    stored = [grid.stored_index(index) for index in range(41)]
+    assert {index: other for index, other in enumerate(stored) if other != index} == {2: 1, 4: 3}
+    assert stored == [truncated_index(float(torque)) for torque in grid.torques]
+
+
+@pytest.mark.parametrize(
+    ("environment", "stored_index", "kind", "count"),
+    [
+        ("Pendulum-v1", "exact", TorqueGrid, 7),
+        ("Pendulum-v1", "truncated", TruncatingTorqueGrid, 41),
+        ("CartPole-v1", "exact", DiscreteActions, 2),
+    ],
+)
+def test_make_actions_returns_the_actions_of_the_environment(
+    environment: str, stored_index: str, kind: type, count: int
+) -> None:
+    actions = make_actions(environment, torque_count=7, stored_index=stored_index)
+    assert type(actions) is kind
+    assert actions.count == count
+
+
+def test_make_actions_stores_exact_indices_by_default() -> None:
+    assert type(make_actions("Pendulum-v1", 41)) is TorqueGrid

@@ -1,0 +1,225 @@
+from __future__ import annotations
+
+import functools
+import itertools
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from keras_pendulum.optimum import optimal_return as module
+from keras_pendulum.optimum.optimal_return import best_return, optimal_return
+from keras_pendulum.optimum.value_iteration import greedy_return, solve, value_tables
+
+Array = NDArray[np.float64]
+GRID = np.linspace(-2, 2, 41)  # N·m
+
+
+def pendulum(gravity: float) -> Any:
+    return gymnasium.make("Pendulum-v1", g=gravity, disable_env_checker=True).unwrapped
+
+
+def starts(count: int) -> Array:
+    """Returns the states [count, 2] (θ, θ̇) of the reset seeds from 0 on."""
+    env = pendulum(1.0)
+    return np.array([(env.reset(seed=seed), env.state)[1] for seed in range(count)])
+
+
+def gymnasium_return(env: Any, start: Array, torques: list[float]) -> float:
+    env.state, env.last_u = start, None
+    return float(sum(env.step(np.array([torque]))[1] for torque in torques))
+
+
+@functools.lru_cache(maxsize=1)
+def coarse_tables(gravity: float) -> list[NDArray[np.float32]]:
+    return list(itertools.islice(value_tables(gravity, 100), 200))
+
+
+@pytest.fixture
+def searched_starts(monkeypatch: pytest.MonkeyPatch) -> list[Array]:
+    """Replaces the search by a function that records its starts and finds nothing."""
+    recorded: list[Array] = []
+
+    def record(table: NDArray[np.float32], gravity: float, start: Array, steps: int) -> float:
+        recorded.append(start)
+        return -np.inf
+
+    monkeypatch.setattr(module, "_search_return", record)
+    return recorded
+
+
+def use_tables(monkeypatch: pytest.MonkeyPatch, tables: list[NDArray[np.float32]]) -> None:
+    """Replaces the tables of every step by `tables`, and the fine table by the last of them.
+
+    V has more and wider discontinuities in coarse tables than in the fine one.
+    """
+    monkeypatch.setattr(module, "solve", lambda gravity, steps: tables[-1])
+    monkeypatch.setattr(module, "value_tables", lambda gravity, cells: iter(tables))
+
+
+@pytest.mark.parametrize(
+    ("gravity", "steps", "count", "lowest", "highest"),
+    [
+        (1, 200, 100, -36.68 - 0.05, -36.68 + 0.05),
+        (1, 200, 1000, -40.69 - 0.05, -40.69 + 0.05),
+        (10, 200, 100, -132.7 - 0.05, -132.3),  # -132.7 was published, without two catches
+        (10, 200, 1000, -135.5 - 0.3, -135.5 + 0.3),
+        (10, 60, 100, -131.90, -131.88),  # these two were computed here, not published
+        (10, 60, 1000, -135.17, -135.15),
+    ],
+)
+def test_shipped_returns_have_the_published_means(
+    gravity: float,
+    steps: int,
+    count: int,
+    lowest: float,
+    highest: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(module, "best_return", None)  # nothing is computed
+    returns = optimal_return(gravity, range(count), steps)
+    assert returns.dtype == np.float64
+    assert returns.shape == (count,)
+    assert lowest < returns.mean() < highest
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("gravity", "steps", "max_gain", "max_mean_gain"),
+    [(1.0, 200, 0.02, 0.01), (10.0, 200, 40.0, 1.0), (10.0, 60, 40.0, 1.0)],
+)
+def test_shipped_returns_are_at_least_those_of_a_coarse_policy(
+    gravity: float, steps: int, max_gain: float, max_mean_gain: float
+) -> None:
+    gain = optimal_return(gravity, range(100), steps) - greedy_return(
+        coarse_tables(gravity)[:steps], gravity, starts(100)
+    )
+    assert gain.min() > -1e-6
+    assert gain.max() < max_gain  # at g = 10 a coarse policy misses whole catches
+    assert gain.mean() < max_mean_gain
+    assert np.median(gain) < 0.3
+
+
+def test_optimum_of_a_short_episode_is_above_its_part_of_a_long_one() -> None:
+    short, long = (optimal_return(10.0, range(10_000), steps) for steps in (60, 200))
+    assert (short >= long).mean() > 0.99  # no reward is positive
+    assert (short[:1000] > long[:1000] - 0.2).all()
+    first_60_steps = greedy_return([coarse_tables(10.0)[-1]] * 60, 10.0, starts(1000))
+    assert (short[:1000] > first_60_steps - 0.2).all()
+    assert (short[:1000] > first_60_steps).mean() > 0.9
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_best_return_equals_the_best_of_all_torque_sequences(steps: int) -> None:
+    env = pendulum(10.0)
+    states = starts(20)
+    sequences = [[*first, 0.0] for first in itertools.product(GRID, repeat=steps - 1)]
+    best = [max(gymnasium_return(env, start, torques) for torques in sequences) for start in states]
+    np.testing.assert_allclose(best_return(10.0, states, steps), best, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("seed", "lowest"), [(28, -215.1), (657, -217.7), (535, -259.6), (855, -269.1)]
+)
+def test_shipped_returns_include_the_search(seed: int, lowest: float) -> None:
+    assert optimal_return(10.0, [seed])[0] > lowest  # 17, 22, 1.2 and 1.2 more than without it
+
+
+def test_search_improves_on_the_greedy_policies(monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = coarse_tables(10.0)
+    use_tables(monkeypatch, tables)
+    states = starts(835)[[0, 34, 53, 93, 834]]  # V is too low at three and too high at the last
+    fine = greedy_return([tables[-1]] * 200, 10.0, states)
+    greedy = np.maximum(fine, greedy_return(tables, 10.0, states))
+    gain = best_return(10.0, states, 200) - greedy
+    assert (gain >= 0).all()
+    assert (gain > [-1, 0.5, 2, 10, 1]).all()
+
+
+def test_search_tries_every_torque_in_three_steps() -> None:
+    env, start = pendulum(10.0), np.array([2.5, 1.0])
+
+    def return_without_further_torque(torques: list[float]) -> float:
+        return gymnasium_return(env, start, torques + [0.0] * (20 - len(torques)))
+
+    path: list[float] = []
+    best = []
+    for _ in range(3):
+        candidates = [[*path, torque] for torque in GRID]
+        path = max(candidates, key=return_without_further_torque)
+        best.append(return_without_further_torque(path))
+    assert best[0] < best[1] - 1 < best[2] - 2
+    zeros = np.zeros((3201, 101), np.float32)  # the policy that is greedy on it applies no torque
+    assert module._search_return(zeros, 10.0, start, 20) == pytest.approx(best[2], abs=1e-9)
+    one_step = gymnasium_return(env, start, [0.0])
+    assert module._search_return(zeros, 10.0, start, 1) == pytest.approx(one_step)
+
+
+def test_no_search_where_value_and_simulated_return_agree(
+    monkeypatch: pytest.MonkeyPatch, searched_starts: list[Array]
+) -> None:
+    use_tables(monkeypatch, [solve(1.0, theta_cells=200)] * 200)
+    difference = best_return(1.0, starts(100), 200) - optimal_return(1.0)
+    assert np.abs(difference).max() < 0.01
+    assert not searched_starts
+
+
+def test_tables_of_each_step_are_used_where_the_pendulum_cannot_be_swung_up(
+    monkeypatch: pytest.MonkeyPatch, searched_starts: list[Array]
+) -> None:
+    tables = coarse_tables(20.0)
+    use_tables(monkeypatch, tables)
+    one_table = greedy_return([tables[-1]] * 200, 20.0, starts(30)).mean()
+    assert best_return(20.0, starts(30), 200).mean() > one_table + 30
+    assert len(searched_starts) < 5  # the search continues with that one table, the worse policy
+
+
+@pytest.mark.parametrize(("steps", "cells"), [(200, 100), (60, 333), (2, 1600)])
+def test_tables_of_shorter_episodes_are_finer_in_the_same_memory(
+    steps: int, cells: int, monkeypatch: pytest.MonkeyPatch, searched_starts: list[Array]
+) -> None:
+    requested_cells: list[int] = []
+    zeros = np.zeros((3201, 101), np.float32)
+
+    def record(gravity: float, theta_cells: int) -> Any:
+        requested_cells.append(theta_cells)
+        return itertools.repeat(zeros)
+
+    monkeypatch.setattr(module, "solve", lambda gravity, steps: zeros)
+    monkeypatch.setattr(module, "value_tables", record)
+    best_return(10.0, starts(1), steps)
+    assert requested_cells == [cells]
+
+
+@pytest.mark.parametrize("gravity", [-0.1, 100.5, np.nan, np.inf, "heavy", None])
+def test_wrong_gravity_is_refused_in_one_line(gravity: Any) -> None:
+    with pytest.raises(ValueError, match=r"gravity is .*; expected a number from 0 to 100") as info:
+        optimal_return(gravity)
+    assert "\n" not in str(info.value)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32])
+def test_wrong_seed_is_refused(seed: int) -> None:
+    with pytest.raises(ValueError, match=f"seed is {seed}; expected 0 to"):
+        optimal_return(1.0, [seed])
+
+
+@pytest.mark.parametrize("steps", [-1, 0, 201])
+def test_wrong_number_of_steps_is_refused(steps: int) -> None:
+    with pytest.raises(ValueError, match=f"steps is {steps}; expected 1 to 200"):
+        optimal_return(1.0, [0], steps)
+
+
+def test_seeds_are_accepted_in_any_order_repeated_and_empty(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    first = optimal_return(1.0, range(10))
+    np.testing.assert_array_equal(optimal_return(1.0, iter([7, 2, 7])), first[[7, 2, 7]])
+    assert optimal_return(1.0, np.arange(3)).tolist() == first[:3].tolist()
+    assert optimal_return(1.0, []).shape == (0,)

@@ -1,0 +1,176 @@
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from keras_pendulum.optimum import return_cache
+from keras_pendulum.optimum.optimal_return import optimal_return
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "keras_pendulum"
+
+
+@pytest.fixture
+def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Replaces the computation by a fast one; the list has the number of starts of each call."""
+    counts: list[int] = []
+
+    def fast_return(gravity: float, starts: Array, steps: int) -> Array:
+        counts.append(len(starts))
+        return np.asarray(-gravity - np.abs(starts[:, 0]) - 1 / steps)
+
+    monkeypatch.setattr("keras_pendulum.optimum.optimal_return.best_return", fast_return)
+    return counts
+
+
+def archive(**changes: Any) -> bytes:
+    arrays: dict[str, Any] = {
+        "gravity": np.float64(9.81),
+        "seeds": np.arange(1000),
+        "returns": np.full(1000, -7.0),
+    }
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **{**arrays, **changes})
+    return buffer.getvalue()
+
+
+def archive_without_returns() -> bytes:
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, gravity=np.float64(9.81), seeds=np.arange(1000))
+    return buffer.getvalue()
+
+
+def test_returns_are_computed_once_and_stored_with_later_seeds(
+    cache: Path, computed: list[int]
+) -> None:
+    first = optimal_return(9.81, [3, 2000])
+    np.testing.assert_array_equal(optimal_return(9.81, [3, 2000, 999])[:2], first)
+    assert computed == [1001]  # seeds 0 to 999, and 2000
+    optimal_return(9.81, [2000, 2001])
+    optimal_return(9.81, [2001, 2000, 0])
+    assert computed == [1001, 1]
+    optimal_return(1.0, np.array([5, 10_000]))
+    assert computed == [1001, 1, 1]  # the package contains seed 5
+    assert sorted(path.name for path in cache.iterdir()) == ["gravity_1.npz", "gravity_9.81.npz"]
+
+
+def test_each_number_of_steps_has_its_own_file(cache: Path, computed: list[int]) -> None:
+    long, short = (optimal_return(9.81, [3], steps)[0] for steps in (200, 60))
+    assert long - short == pytest.approx(1 / 60 - 1 / 200)
+    assert [optimal_return(9.81, [3], steps)[0] for steps in (200, 60)] == [long, short]
+    assert computed == [1000, 1000]
+    names = ["gravity_9.81.npz", "gravity_9.81_steps_60.npz"]
+    assert sorted(path.name for path in cache.iterdir()) == names
+
+
+def test_valid_cache_is_used(cache: Path, computed: list[int]) -> None:
+    cache.mkdir()
+    (cache / "gravity_9.81.npz").write_bytes(archive())
+    assert optimal_return(9.81, [4]) == [-7.0]
+    assert not computed
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"not an archive",
+        archive()[:-30],
+        archive()[:100],
+        archive(gravity=np.float64(9.8)),
+        archive(gravity=np.array([9.81])),
+        archive(gravity=np.array("9.81")),
+        archive(steps=np.int64(60)),
+        archive(returns=np.full(1000, np.nan)),
+        archive(returns=np.full(1000, -np.inf)),
+        archive(returns=np.full(1000, 1.0)),
+        archive(returns=np.full(1000, -4000.0)),
+        archive(returns=np.full(999, -7.0)),
+        archive(returns=np.full(1000, -7.0, np.float32)),
+        archive(returns=np.full(1000, -7.0, object)),
+        archive(seeds=np.arange(1000.0)),
+        archive(seeds=np.zeros((1000, 1), np.int64), returns=np.full((1000, 1), -7.0)),
+        archive(seeds=np.int64(4), returns=np.float64(-7)),
+        archive_without_returns(),
+    ],
+)
+def test_damaged_or_foreign_cache_is_computed_again_and_replaced(
+    content: bytes, cache: Path, computed: list[int]
+) -> None:
+    cache.mkdir()
+    (cache / "gravity_9.81.npz").write_bytes(content)
+    returns = optimal_return(9.81, range(5))
+    assert (returns < -9).all()
+    assert computed == [1000]
+    np.testing.assert_array_equal(optimal_return(9.81, range(5)), returns)
+    assert computed == [1000]
+    assert [path.name for path in cache.iterdir()] == ["gravity_9.81.npz"]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        archive(),
+        archive(steps=np.int64(61)),
+        archive(steps=np.array([60])),
+        archive(steps=np.int64(60), returns=np.full(1000, -1000.0)),
+    ],
+)
+def test_cache_of_another_episode_length_is_computed_again(
+    content: bytes, cache: Path, computed: list[int]
+) -> None:
+    cache.mkdir()
+    (cache / "gravity_9.81_steps_60.npz").write_bytes(content)
+    returns = optimal_return(9.81, range(5), 60)
+    assert ((returns < -9) & (returns > -13)).all()
+    assert computed == [1000]
+
+
+@pytest.mark.parametrize("steps", [60, 200])
+def test_file_with_a_flipped_bit_never_gives_another_return(steps: int, tmp_path: Path) -> None:
+    path = tmp_path / "gravity_9.81.npz"
+    returns = {seed: -seed / 7 for seed in range(10)}
+    return_cache.write(path, 9.81, steps, returns)
+    valid = path.read_bytes()
+    for position in range(len(valid)):
+        data = bytearray(valid)
+        data[position] ^= 0x01
+        path.write_bytes(data)
+        assert return_cache.read(path, 9.81, steps) in ({}, returns)
+
+
+def test_unwritable_cache_folder_is_ignored(
+    tmp_path: Path, computed: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    assert (optimal_return(9.81, range(5)) < -9).all()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "keras_pendulum" / "gravity_9.81.npz").mkdir(parents=True)
+    assert (optimal_return(9.81, range(5)) < -9).all()
+    assert computed == [1000, 1000]
+
+
+def test_returns_are_computed_for_a_user_without_a_home_folder(
+    computed: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_home(path: Path) -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    shipped = optimal_return(1.0, range(5))
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "expanduser", no_home)
+    np.testing.assert_array_equal(optimal_return(1.0, range(5)), shipped)
+    first, second = (optimal_return(9.81, range(5)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert computed == [1000, 1000]  # without a cache folder, each call computes

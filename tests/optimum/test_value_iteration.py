@@ -1,0 +1,88 @@
+from __future__ import annotations
+
+import functools
+import itertools
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from keras_pendulum.optimum.value_iteration import greedy_return, solve, value_at, value_tables
+
+TORQUES = np.linspace(-2, 2, 41)  # N·m
+
+
+def pendulum(gravity: float) -> Any:
+    return gymnasium.make("Pendulum-v1", g=gravity, disable_env_checker=True).unwrapped
+
+
+@functools.cache
+def coarse_tables() -> list[NDArray[np.float32]]:
+    """Returns the tables of the last 60 steps at g = 10."""
+    return list(itertools.islice(value_tables(10.0, 100), 60))
+
+
+@pytest.mark.parametrize("gravity", [1.0, 10.0])
+@pytest.mark.parametrize(
+    ("start", "tolerance"),
+    [
+        ((0.3, -0.2), 2e-4),
+        ((-0.3, 0.7), 2e-4),
+        ((0.01, 0.0), 2e-4),
+        ((-0.1, 4.0), 2e-4),
+        ((0.2, -3.0), 2e-4),
+        ((1.5, 7.95), 2e-4),
+        ((-1.6, -7.9), 2e-4),
+        ((3.1, 1.0), 0.03),  # θ² has a kink at ±π, and a grid is less exact in the kink's cell
+        ((-3.1, -2.0), 0.03),
+    ],
+)
+def test_value_is_the_best_return_of_all_torque_sequences(
+    gravity: float, start: tuple[float, float], tolerance: float
+) -> None:
+    env = pendulum(gravity)
+
+    def best(state: Any, horizon: int) -> float:
+        if horizon == 0:
+            return 0.0
+        returns = []
+        # In the last step only the torque's own cost counts.
+        for torque in TORQUES if horizon > 1 else TORQUES[18:23]:
+            env.state, env.last_u = np.array(state), None
+            reward = env.step(np.array([torque]))[1]
+            returns.append(reward + best(env.state, horizon - 1))
+        return float(max(returns))
+
+    tables = list(itertools.islice(value_tables(gravity, 500), 4))
+    for horizon in (1, 2, 3):
+        theta, speed = np.array([start[0]]), np.array([start[1]])
+        assert value_at(tables[horizon], theta, speed)[0] == pytest.approx(
+            best(start, horizon), abs=tolerance
+        )
+
+
+def test_solve_returns_the_table_of_the_horizon() -> None:
+    np.testing.assert_array_equal(solve(10.0, horizon=9, theta_cells=100), coarse_tables()[9])
+
+
+def test_greedy_return_equals_gymnasiums() -> None:
+    env = pendulum(10.0)
+    for seed in range(3):
+        env.reset(seed=seed)
+        simulated, total = greedy_return(coarse_tables(), 10.0, env.state[None]), 0.0
+        for table in reversed(coarse_tables()):
+            theta, speed = env.state
+            next_speed = np.clip(speed + (15 * np.sin(theta) + 3 * TORQUES) * 0.05, -8, 8)
+            value = value_at(table, theta + next_speed * 0.05, next_speed) - 0.001 * TORQUES**2
+            total += env.step(TORQUES[value.argmax()][None])[1]
+        assert total == pytest.approx(simulated[0], abs=1e-6)
+
+
+def test_mirrored_starts_have_the_same_value_and_return() -> None:
+    states = np.random.default_rng(0).uniform((-np.pi, -1), (np.pi, 1), (20, 2))
+    table = coarse_tables()[-1]
+    np.testing.assert_allclose(value_at(table, *states.T), value_at(table, *-states.T), atol=1e-3)
+    returns = greedy_return([table] * 60, 10.0, states)
+    np.testing.assert_allclose(greedy_return([table] * 60, 10.0, -states), returns, atol=0.01)

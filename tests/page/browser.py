@@ -1,0 +1,107 @@
+"""Headless Chromium, and a user of the page in it."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.webelement import WebElement
+
+
+def find_chromium() -> tuple[str, str] | None:
+    """Returns the paths of the browser and of its driver; None unless both are installed."""
+    browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    driver = shutil.which("chromedriver")
+    return (browser, driver) if browser and driver else None
+
+
+def start(browser: str, driver: str) -> webdriver.Chrome:
+    """Starts a browser that logs its errors and its network requests."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = browser
+    for flag in (
+        "--headless=new",
+        "--no-sandbox",  # the sandbox does not work for root, and the tests open only local files
+        "--disable-dev-shm-usage",
+        "--disable-gpu",
+        "--disable-component-update",
+    ):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    # Without the path of the driver, Selenium would search the network for one.
+    return webdriver.Chrome(options, Service(driver))
+
+
+class Player:
+    """A user of the page."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def set_screen(self, width: int, height: int, **media: str) -> None:
+        """Sets the size of the screen, and preferences such as `color-scheme`."""
+        phone = width < 600
+        size = {"width": width, "height": height, "deviceScaleFactor": 1 + phone, "mobile": phone}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        features = [{"name": f"prefers-{key}", "value": value} for key, value in media.items()]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+    def open(self, address: str) -> None:
+        self.driver.get(address)
+
+    def find(self, id: str) -> WebElement:
+        return self.driver.find_element(By.ID, id)
+
+    def text(self, id: str) -> str:
+        return self.find(id).text
+
+    def button(self, torque: int) -> WebElement:
+        return self.driver.find_element(By.CSS_SELECTOR, f'[data-torque="{torque}"]')
+
+    def press(self, *keys: str) -> None:
+        """Types keys into the element that has the focus."""
+        ActionChains(self.driver, duration=0).send_keys(*keys).perform()
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        return self.driver.execute_script(script, *arguments)
+
+    def state(self) -> dict[str, Any]:
+        state: dict[str, Any] = self.run("return pendulum.state()")
+        return state
+
+    def focus(self) -> str:
+        """Returns the id of the element that has the focus, or its torque."""
+        return str(self.run("const e = document.activeElement; return e.id || e.dataset.torque"))
+
+    def log(self, kind: str) -> list[dict[str, Any]]:
+        """Returns the entries of a browser log since the last call."""
+        entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
+        return entries
+
+    def wait(self, condition: Callable[[], bool], seconds: float = 10) -> None:
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, f"the condition is still false after {seconds} s"
+            time.sleep(0.02)
+
+    def picture(self, id: str) -> NDArray[np.uint8]:
+        """Redraws a canvas; returns its pixels [rows, columns, RGBA]."""
+        self.run("pendulum.page.changed = true")
+        self.wait(lambda: not self.run("return pendulum.page.changed"))
+        width, pixels = self.run(
+            "const c = document.getElementById(arguments[0]);"
+            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+            "let s = ''; for (let i = 0; i < d.length; i += 8192)"
+            "  s += String.fromCharCode(...d.subarray(i, i + 8192)); return [c.width, s]",
+            id,
+        )
+        flat = np.frombuffer(pixels.encode("latin-1"), np.uint8)
+        return flat.reshape(-1, width, 4)

@@ -1,0 +1,586 @@
+"""The game: without a display, and in real windows that receive keys."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pygame
+import pytest
+from conftest import Command, Refusal, command_line
+
+import keras_pendulum as kp
+from keras_pendulum.cli import ControlC
+from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environment
+from keras_pendulum.evaluate import __main__ as evaluate_command
+from keras_pendulum.play import __main__ as play_command
+from keras_pendulum.play import window as window_module
+from keras_pendulum.play.episode import ManualEpisode, Policy
+from keras_pendulum.play.game import READY_FRAMES, Game, Key
+from keras_pendulum.play.window import Window, play
+
+NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
+CLOSED = "error: the window was closed before the end of the last episode\n"
+STEP = re.compile(r"Step: (\d+), Torque: (\S+), Reward: (\S+), Return: (\S+)")
+
+
+@dataclass
+class Player:
+    """A clock that presses keys at the end of a frame, and then records the window's pixels."""
+
+    keys: Mapping[int, Any]  # frame -> a key of pygame, pygame.QUIT, or a list of them
+    lines: list[str] = field(default_factory=list)
+    frames: int = 0
+    pixels: dict[int, Any] = field(default_factory=dict)  # by frame [600, 700, 3]
+
+    def end_frame(self) -> None:
+        self.frames += 1
+        assert self.frames < 5000, "the game does not end"
+        if self.frames in self.keys:
+            surface = pygame.display.get_surface()
+            assert surface is not None
+            self.pixels[self.frames] = pygame.surfarray.array3d(surface)
+            for key in np.atleast_1d(self.keys[self.frames]).tolist():
+                if key == pygame.QUIT:
+                    pygame.event.post(pygame.event.Event(pygame.QUIT))
+                else:
+                    pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key))
+
+    @property
+    def torques(self) -> list[float]:
+        return [float(match[2]) for match in self._steps()]
+
+    @property
+    def rewards(self) -> list[float]:
+        return [float(match[3]) for match in self._steps()]
+
+    @property
+    def scores(self) -> list[str]:
+        return [line for line in self.lines if line.startswith("you ")]
+
+    def _steps(self) -> list[re.Match[str]]:
+        return [match for line in self.lines if (match := STEP.fullmatch(line))]
+
+
+@pytest.fixture
+def no_window(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    yield
+    pygame.quit()
+
+
+def play_game(keys: Mapping[int, Any], **settings: Any) -> Player:
+    """Plays a whole game, pressing `keys[i]` at the end of frame i."""
+    player = Player(keys)
+    settings = {"gravity": 1.0, "seed": 3, "print_steps": True} | settings
+    game = Game(**settings, print_line=player.lines.append)
+    play(game, Window(player.end_frame), lambda: None)
+    game.close()
+    return player
+
+
+def gymnasium_rewards(torques: list[float], seed: int, gravity: float = 1.0) -> list[float]:
+    env = make_environment("Pendulum-v1", gravity)
+    env.reset(seed=seed)
+    return [float(env.step(np.array([torque]))[1]) for torque in torques]
+
+
+@pytest.mark.parametrize(
+    ("key", "torque"),
+    [
+        ("j", -2),
+        ("l", 2),
+        ("k", 0),
+        ("LEFT", -2),
+        ("RIGHT", 2),
+        ("DOWN", 0),
+        ("UP", 0),
+    ],
+)
+def test_key_starts_and_its_torque_acts_until_the_next_key(
+    key: str, torque: float, no_window: None
+) -> None:
+    other = pygame.K_j if torque == 2 else pygame.K_l
+    player = play_game({1: other, 4: getattr(pygame, f"K_{key}"), 12: pygame.K_ESCAPE})
+    assert player.torques == [-2 if other == pygame.K_j else 2] * 3 + [torque] * 8
+
+
+def test_game_starts_without_a_key_and_without_torque(no_window: None) -> None:
+    player = play_game({READY_FRAMES + 5: pygame.K_ESCAPE})
+    assert player.torques == [0] * 5
+
+
+def test_score_is_the_sum_of_gymnasium_rewards(no_window: None) -> None:
+    keys = {1: pygame.K_l, 30: pygame.K_j, 55: pygame.K_k, 80: pygame.K_RIGHT, 100: pygame.K_LEFT}
+    player = play_game({**keys, 240: pygame.K_ESCAPE}, seed=7, gravity=10.0)
+    assert len(player.torques) == STEPS_PER_EPISODE
+    assert set(player.torques) == {-2, 0, 2}
+    rewards = gymnasium_rewards(player.torques, seed=7, gravity=10.0)
+    assert player.rewards == [round(reward, 3) for reward in rewards]
+    optimum = kp.optimal_return(10.0, [7])[0]
+    assert player.scores == [f"you {sum(rewards):.1f} · best possible {optimum:.1f}"]
+    assert player.lines[0] == "Start: seed 7, g = 10"
+    assert player.lines[-1] == player.scores[0]  # leaving after the score prints nothing
+
+
+def test_steps_are_not_printed_without_print_steps(no_window: None) -> None:
+    player = play_game({1: pygame.K_l, 11: pygame.K_ESCAPE}, print_steps=False)
+    partial_return = sum(gymnasium_rewards([2] * 10, seed=3))
+    assert player.lines == [
+        "Start: seed 3, g = 1",
+        f"you {partial_return:.1f} after 10 of 200 steps",
+    ]
+
+
+def test_r_restarts_the_same_start_without_torque(no_window: None) -> None:
+    player = play_game({1: pygame.K_l, 21: pygame.K_r, 21 + READY_FRAMES + 3: pygame.K_ESCAPE})
+    assert player.torques == [2] * 20 + [0] * 3
+    assert player.rewards[20:] == [round(r, 3) for r in gymnasium_rewards([0] * 3, seed=3)]
+    assert player.scores == [f"you {sum(player.rewards[20:]):.1f} after 3 of 200 steps"]
+
+
+@pytest.mark.parametrize("end", [pygame.K_ESCAPE, pygame.QUIT], ids=["ESC", "closed"])
+def test_leaving_prints_the_score_so_far_and_takes_no_further_step(
+    end: int, no_window: None
+) -> None:
+    player = play_game({1: pygame.K_j, 11: [end, pygame.K_ESCAPE]})
+    partial_return = sum(gymnasium_rewards([-2] * 10, seed=3))
+    assert player.frames == 11
+    assert player.scores == [f"you {partial_return:.1f} after 10 of 200 steps"]
+
+
+def test_after_the_score_r_repeats_the_start_and_enter_plays_the_next(no_window: None) -> None:
+    over = 1 + STEPS_PER_EPISODE
+    player = play_game(
+        {
+            1: pygame.K_l,
+            over + 2: pygame.K_j,  # a torque key leaves the score on the screen
+            over + 5: pygame.K_r,
+            over + 6: pygame.K_l,
+            2 * over + 10: pygame.K_RETURN,
+            2 * over + 11: pygame.K_l,
+            2 * over + 14: pygame.K_ESCAPE,
+        },
+        seed=999,
+    )
+    assert len(player.torques) == 2 * STEPS_PER_EPISODE + 3
+    assert player.scores[0] == player.scores[1]
+    # 999 is the last seed of USUAL_SEEDS.
+    assert [line for line in player.lines if "seed" in line] == [
+        "Start: seed 999, g = 1",
+        "Start: seed 0, g = 1",
+    ]
+    assert player.rewards[-3:] == [round(r, 3) for r in gymnasium_rewards([2] * 3, seed=0)]
+
+
+def test_window_shows_torque_pendulum_and_numbers(no_window: None) -> None:
+    player = play_game({1: pygame.K_l, 10: pygame.K_j, 20: pygame.K_j, 21: pygame.K_ESCAPE})
+    assert player.pixels[1].shape == (600, 700, 3)
+    bar = window_module._BAR
+    right, left = (bar.centerx + 50, bar.centery), (bar.centerx - 50, bar.centery)
+    frames = player.pixels.values()
+    colours = [[tuple(pixels[point]) for point in (left, right)] for pixels in frames]
+    empty, blue = window_module._WHITE, window_module._CLOCKWISE
+    red = window_module._COUNTERCLOCKWISE
+    assert colours == [[empty, empty], [empty, red], [blue, empty], [blue, empty]]
+    for band in ((0, 40), (60, 540), (600, 650)):  # title, pendulum, numbers
+        rows = slice(*band)
+        changed = (player.pixels[20][:, rows] != player.pixels[21][:, rows]).any()
+        assert changed == (band[0] > 0)
+
+
+def test_strip_along_the_lower_edge_grows_with_the_episode(no_window: None) -> None:
+    player = play_game({1: pygame.K_l, 101: pygame.K_j, 201: pygame.K_ESCAPE})
+    row = window_module._TOP + window_module._SIDE - 2
+    rows = [pixels[:, row] for pixels in player.pixels.values()]
+    strips = [(row_pixels == window_module._LINE).all(axis=-1) for row_pixels in rows]
+    assert [int(strip.sum()) for strip in strips] == [0, 300, 600]
+    assert strips[1][:300].all()
+
+
+@pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 40.0])
+def test_invalid_torque_is_refused_before_the_environment(torque: float) -> None:
+    class ResetOnly:
+        def reset(self, seed: int) -> tuple[None, None]:
+            return None, None
+
+    episode = ManualEpisode(ResetOnly(), seed=0)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="expected a number from -2 to 2"):
+        episode.step(torque)
+
+
+@pytest.fixture(scope="module")
+def agent() -> Policy:
+    return play_command._load_agent("reference", None)[0]
+
+
+def test_agent_drives_the_same_start_and_three_returns_are_printed(
+    agent: Policy, no_window: None
+) -> None:
+    over = 1 + 2 * STEPS_PER_EPISODE
+    player = play_game({1: pygame.K_l, over + 10: pygame.K_ESCAPE}, seed=11, agent=agent)
+    you = sum(gymnasium_rewards([2] * STEPS_PER_EPISODE, seed=11))
+    score = kp.evaluate_policy(kp.load_weights(kp.find_weights("reference")), 1, seed=11)
+    assert player.scores == [
+        f"you {you:.1f} · agent {score.mean_return:.1f} · "
+        f"best possible {score.optimal_mean_return:.1f}"
+    ]
+    assert len(player.torques) == STEPS_PER_EPISODE  # only the player's steps are printed
+
+
+@pytest.mark.parametrize("key", [pygame.K_SPACE, pygame.K_RETURN], ids=["space", "enter"])
+def test_key_skips_to_the_score_of_the_agent(key: int, agent: Policy, no_window: None) -> None:
+    over = 1 + STEPS_PER_EPISODE
+    player = play_game({1: pygame.K_l, over + 5: key, over + 7: pygame.K_ESCAPE}, agent=agent)
+    score = kp.evaluate_policy(kp.load_weights(kp.find_weights("reference")), 1, seed=3)
+    assert f"agent {score.mean_return:.1f} · best" in player.scores[0]
+    assert player.frames == over + 7
+
+
+def test_leaving_while_the_agent_drives_prints_the_score_of_the_player(
+    agent: Policy, no_window: None
+) -> None:
+    over = 1 + STEPS_PER_EPISODE
+    player = play_game({1: pygame.K_l, over + 5: pygame.K_ESCAPE}, agent=agent)
+    you = sum(gymnasium_rewards([2] * STEPS_PER_EPISODE, seed=3))
+    optimum = kp.optimal_return(1.0, [3])[0]
+    assert player.scores == [f"you {you:.1f} · best possible {optimum:.1f}"]
+
+
+@pytest.fixture
+def game_settings(monkeypatch: pytest.MonkeyPatch, no_window: None) -> dict[str, Any]:
+    """The settings of the game that the command would run."""
+    settings: dict[str, Any] = {}
+
+    def record(gravity: float, seed: int | None, agent: Any, print_steps: bool) -> int:
+        settings.update(gravity=gravity, seed=seed, agent=agent, print_steps=print_steps)
+        return 0
+
+    monkeypatch.setattr(play_command, "_run_game", record)
+    return settings
+
+
+@pytest.mark.parametrize(
+    ("words", "gravity"),
+    [
+        ([], 1.0),
+        (["--gravity", "3"], 3.0),
+        (["--against", "reference"], 1.0),
+        (["--against", "swingup"], 10.0),
+        (["--against", "swingup", "--gravity", "0"], 0.0),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_gravity_is_the_flag_or_the_recorded_one_or_1(
+    words: list[str], gravity: float, game_settings: dict[str, Any]
+) -> None:
+    assert play_command.main(words) == 0
+    assert game_settings["gravity"] == gravity
+    assert (game_settings["agent"] is not None) == ("--against" in words)
+
+
+def test_play_starts_without_tensorflow_and_help_without_numpy() -> None:
+    code = (
+        "import runpy, sys\n"
+        "sys.argv = ['play', *{words}]\n"
+        "try:\n"
+        "    runpy.run_module('keras_pendulum.play', run_name='__main__')\n"
+        "except SystemExit as exit:\n"
+        "    assert exit.code == 0\n"
+        "assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)\n"
+    )
+    heavy = {"tensorflow", "keras", "h5py", "matplotlib"}
+    close_window = (
+        "import threading, pygame\n"
+        "def close():\n"
+        "    pygame.event.post(pygame.event.Event(pygame.QUIT))\n"
+        "threading.Timer(1.5, close).start()\n"
+    )
+    for words, unwanted, before in (
+        (["--help"], heavy | {"numpy", "gymnasium", "pygame"}, ""),
+        (["--seed", "4"], heavy, close_window),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", before + code.format(words=words, heavy=unwanted)],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+            env={**os.environ, "SDL_VIDEODRIVER": "dummy"},
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+    assert "Start: seed 4, g = 1\nyou " in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--against", "missing.h5"], "missing.h5: no such file"),
+        (["--against", "text.h5"], "text.h5: not an HDF5 file"),
+        (["--against", "cartpole"], "cartpole.h5: belongs to CartPole-v1; expected Pendulum-v1"),
+        (["--against", ""], "the name is empty"),
+        (["--gravity", "nan", "--against", "missing.h5"], "gravity is nan"),
+        (["--gravity", "101"], "gravity is 101"),
+        (["--seed", "-1", "--against", "missing.h5"], "seed is -1"),
+        (["--seed", "one"], "invalid int value: 'one'"),
+        (["--faster"], "unrecognized arguments: --faster"),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_mistake_prints_one_line_and_opens_no_window(
+    words: list[str], message: str, no_window: None, refusal: Refusal
+) -> None:
+    assert message in refusal(play_command.main, words)
+    assert not pygame.display.get_init() or pygame.display.get_surface() is None
+
+
+@pytest.mark.parametrize("display", ["", ":9999"], ids=["none", "wrong"])
+def test_missing_display_prints_one_line(display: str, command: Command) -> None:
+    done = command("play", "--seed", "1", environment={**NO_DISPLAY, "DISPLAY": display})
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "error: there is no display to open a window on\n"
+
+
+class Screen:
+    """An X server that shows only the windows of one test."""
+
+    def __init__(self) -> None:
+        reading, writing = os.pipe()
+        self._server = subprocess.Popen(
+            # Without -noreset the server restarts when its last client ends, and refuses clients
+            # meanwhile.
+            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x800x24", "-noreset"],
+            pass_fds=[writing],
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(writing)
+        with os.fdopen(reading) as pipe:  # the server writes its number when it is ready
+            number = pipe.readline().strip()
+        display = {"DISPLAY": f":{number}", "PYTHONUNBUFFERED": ""}
+        self.environment = {**os.environ, **NO_DISPLAY, **display}
+
+    def xdotool(self, *words: str) -> str:
+        return subprocess.run(
+            ["xdotool", *words],
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=20,
+        ).stdout.strip()
+
+    def stop(self) -> None:
+        self._server.terminate()
+        self._server.wait()
+
+
+@pytest.fixture
+def screen() -> Iterator[Screen]:
+    missing = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
+    if missing:
+        reason = f"a real window needs {' and '.join(missing)} (packages xvfb and xdotool)"
+        if os.environ.get("CI"):
+            pytest.fail(reason, pytrace=False)
+        pytest.skip(reason)
+    screen = Screen()
+    yield screen
+    screen.stop()
+
+
+# Closes the window of the command `sys.argv[1]` as soon as it is open.
+CLOSE_WINDOW = """
+import runpy, sys, threading, time
+import pygame
+
+def close_window():
+    while not (pygame.display.get_init() and pygame.display.get_surface()):
+        time.sleep(0.1)
+    print("closing the window", file=sys.stderr, flush=True)
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+
+threading.Thread(target=close_window, daemon=True).start()
+runpy.run_module("keras_pendulum." + sys.argv.pop(1), run_name="__main__")
+"""
+
+
+class WindowCommand:
+    """A running command with a window on the screen, and its output so far."""
+
+    def __init__(self, screen: Screen, folder: Path, words: Sequence[str]) -> None:
+        self.screen = screen
+        self._out, self._err = folder / "out", folder / "err"
+        with self._out.open("w") as out, self._err.open("w") as err:
+            self.process = subprocess.Popen(words, env=screen.environment, stdout=out, stderr=err)
+
+    def __enter__(self) -> WindowCommand:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.process.kill()
+        self.process.wait()
+
+    @property
+    def out(self) -> str:
+        return self._out.read_text(encoding="utf-8")
+
+    @property
+    def err(self) -> str:
+        return self._err.read_text(encoding="utf-8")
+
+    def torque(self) -> str:
+        """Returns the torque of the last complete line of a step."""
+        steps = STEP.findall(self.out[: self.out.rfind("\n") + 1])
+        return str(steps[-1][1]) if steps else "none"
+
+    def wait_for_window(self) -> None:
+        words = "search", "--onlyvisible", "--pid", str(self.process.pid)
+        self.wait_for(lambda: self.screen.xdotool(*words) != "")
+
+    def wait_for_torque(self, torque: str) -> None:
+        self.wait_for(lambda: self.torque() == torque)
+
+    def press(self, key: str) -> None:
+        self.screen.xdotool("key", key)
+
+    def wait_for(self, condition: Callable[[], bool]) -> None:
+        until = time.monotonic() + 20
+        while time.monotonic() < until and self.process.poll() is None:
+            if condition():
+                return
+            time.sleep(0.05)
+        pytest.fail(f"timeout, or the command ended: {self.out[-500:]}{self.err}", pytrace=False)
+
+    def wait(self) -> int:
+        return self.process.wait(timeout=60)
+
+
+def play_words(*words: str) -> Sequence[str]:
+    return command_line("play", "--print-steps", *words)
+
+
+def closing_words(*words: str) -> Sequence[str]:
+    """Returns the words that start a command whose window is closed at once."""
+    return [sys.executable, "-c", CLOSE_WINDOW, *words]
+
+
+def test_keys_drive_the_pendulum_in_a_real_window(screen: Screen, tmp_path: Path) -> None:
+    with WindowCommand(screen, tmp_path, play_words("--seed", "5")) as game:
+        game.wait_for_window()
+        for key, torque in (("j", "-2"), ("l", "2"), ("k", "0"), ("Left", "-2"), ("Right", "2")):
+            game.press(key)
+            game.wait_for_torque(torque)
+        game.press("r")
+        game.press("Down")
+        game.wait_for_torque("0")
+        game.press("Escape")
+        assert game.wait() == 0
+    assert game.err == ""
+    steps = STEP.findall(game.out)
+    restart = [int(step[0]) for step in steps].index(1, 1)
+    torques = [float(step[1]) for step in steps]
+    for episode in (slice(0, restart), slice(restart, None)):
+        rewards = [f"{reward:.3f}" for reward in gymnasium_rewards(torques[episode], seed=5)]
+        assert [step[2] for step in steps[episode]] == rewards
+    partial_return = float(steps[-1][3])
+    last_line = game.out.splitlines()[-1]
+    assert last_line == f"you {partial_return:.1f} after {steps[-1][0]} of 200 steps"
+
+
+def test_keys_drive_the_pendulum_in_a_process_with_tensorflow(
+    screen: Screen, tmp_path: Path
+) -> None:
+    words = play_words("--against", "reference", "--seed", "5")
+    with WindowCommand(screen, tmp_path, words) as game:
+        game.wait_for_window()
+        game.press("l")
+        game.wait_for_torque("2")
+        game.press("Escape")
+        assert game.wait() == 0
+    assert "error" not in game.err
+    assert re.search(r"\nyou \S+ after \d+ of 200 steps\n$", game.out)
+
+
+def test_control_c_ends_play(screen: Screen, tmp_path: Path) -> None:
+    with WindowCommand(screen, tmp_path, play_words()) as game:
+        game.wait_for_window()
+        game.process.send_signal(signal.SIGINT)
+        assert game.wait() == 130
+    assert game.err == ""
+
+
+def test_control_c_that_pygame_drops_ends_play_at_the_next_frame() -> None:
+    class DroppingWindow:
+        """A window that drops the exception of Ctrl-C in its second frame, as pygame may."""
+
+        frames = 0
+
+        def pressed_keys(self) -> list[Key]:
+            return []
+
+        def show(self, view: object) -> None:
+            self.frames += 1
+            assert self.frames < 10, "the game does not end"
+            if self.frames == 2:
+                with contextlib.suppress(KeyboardInterrupt):
+                    signal.raise_signal(signal.SIGINT)
+
+    window: Any = DroppingWindow()
+    game = Game(1.0, 5)
+    before = signal.getsignal(signal.SIGINT)
+    # The test runner may have been started with Ctrl-C ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with ControlC() as control_c, pytest.raises(KeyboardInterrupt):
+        play(game, window, control_c.check)
+    game.close()
+    assert window.frames == 2
+    assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
+
+
+def test_closing_the_window_ends_play_with_the_score(screen: Screen, tmp_path: Path) -> None:
+    words = closing_words("play", "--against", "reference", "--seed", "5")
+    with WindowCommand(screen, tmp_path, words) as game:
+        assert game.wait() == 0
+    assert "closing the window" in game.err
+    assert "error" not in game.err
+    assert re.search(r"\nyou \S+ after \d+ of 200 steps\n$", game.out)
+
+
+def test_closing_the_real_window_ends_evaluation_in_one_line(
+    screen: Screen, tmp_path: Path
+) -> None:
+    words = closing_words("evaluate", "reference", "--render")
+    with WindowCommand(screen, tmp_path, words) as evaluation:
+        assert evaluation.wait() == 2
+    assert evaluation.out == ""
+    assert "closing the window" in evaluation.err
+    assert evaluation.err.endswith(CLOSED)
+
+
+def test_closing_the_window_ends_evaluation_in_one_line(no_window: None, refusal: Refusal) -> None:
+    pygame.display.init()
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    assert refusal(evaluate_command.main, ["reference", "--render"]) == CLOSED
+
+
+@pytest.mark.parametrize("flag", ["--live", "--render"])
+def test_closing_the_window_does_not_end_training(
+    flag: str, screen: Screen, tmp_path: Path
+) -> None:
+    episodes = "60" if flag == "--live" else "1"
+    words = ["train", flag, "--quiet", "--episodes", episodes, "--out", str(tmp_path / "run")]
+    with WindowCommand(screen, tmp_path, closing_words(*words)) as training:
+        assert training.wait() == 0
+    assert "closing the window" in training.err
+    assert "error" not in training.err
+    assert f"Trained {episodes} episodes" in training.out

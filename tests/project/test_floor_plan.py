@@ -1,0 +1,134 @@
+"""The order of the rooms: each module imports only from its own room and from those below it."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import keras_pendulum
+
+PACKAGE = Path(keras_pendulum.__file__).parent
+# From the top down. The modules at the end have no room and may be imported from everywhere.
+ROOMS = (
+    *("study", "train", "play", "page", "evaluate", "optimum"),
+    *("storage", "dqn", "config", "environments"),
+)
+WITHOUT_ROOM = ("cli", "display", "tensorflow_setup", "history", "version", "errors")
+ORDER = (*ROOMS, *WITHOUT_ROOM)
+
+
+def imported_modules(path: Path, package: Path = PACKAGE) -> Iterator[str]:
+    """Yields the modules of the package that a file imports, such as `dqn.network`."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        for name in names:
+            parts = name.split(".")
+            if parts[0] == "keras_pendulum":
+                # Drops the imported name: `dqn.network.DQN` becomes `dqn.network`.
+                while parts[1:] and not is_module(package, parts[1:]):
+                    parts.pop()
+                yield ".".join(parts[1:])
+
+
+def is_module(package: Path, parts: list[str]) -> bool:
+    path = package.joinpath(*parts)
+    return path.is_dir() or path.with_suffix(".py").is_file()
+
+
+def module_name(path: Path, package: Path = PACKAGE) -> str:
+    return ".".join(path.relative_to(package).with_suffix("").parts)
+
+
+def problems(package: Path = PACKAGE) -> list[str]:
+    """Returns a line for each upward or circular import of a package."""
+    found: list[str] = []
+    imports: dict[str, set[str]] = {}
+    for path in sorted(package.rglob("*.py")):
+        name = module_name(path, package)
+        if name == "__init__":  # the public names, from everywhere
+            continue
+        imports[name] = set(imported_modules(path, package)) - {name}
+        room = name.split(".")[0]
+        for other in sorted(imports[name]):
+            if not other:
+                found.append(f"{path.relative_to(package)} imports the package itself")
+            elif ORDER.index(other.split(".")[0]) < ORDER.index(room):
+                found.append(f"{path.relative_to(package)} imports {other}, which is above it")
+    found += [f"circular imports: {' -> '.join(circle)}" for circle in circles(imports)]
+    return found
+
+
+def circles(imports: dict[str, set[str]]) -> Iterator[list[str]]:
+    """Yields the circles among the modules, found by a depth-first search."""
+    finished: set[str] = set()
+
+    def visit(name: str, path: list[str]) -> Iterator[list[str]]:
+        if name in path:
+            yield [*path[path.index(name) :], name]
+        elif name not in finished:
+            for other in sorted(imports.get(name, ())):
+                yield from visit(other, [*path, name])
+            finished.add(name)
+
+    for name in sorted(imports):
+        yield from visit(name, [])
+
+
+def test_imports_go_down_the_floor_plan() -> None:
+    assert problems() == []
+
+
+def test_every_module_has_a_place_in_the_floor_plan() -> None:
+    rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert rooms == set(ROOMS)
+    without_room = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
+    assert without_room == set(WITHOUT_ROOM)
+
+
+def test_rooms_have_an_empty_init() -> None:
+    assert [path for path in PACKAGE.glob("*/__init__.py") if path.read_text() != ""] == []
+
+
+@pytest.mark.parametrize(
+    ("file", "line", "problem"),
+    [
+        (
+            "dqn/agent.py",
+            "from keras_pendulum.train.loop import train_episodes",
+            "dqn/agent.py imports train.loop, which is above it",
+        ),
+        (
+            "errors.py",
+            "import keras_pendulum.cli",
+            "errors.py imports cli, which is above it",
+        ),
+        (
+            "train/loop.py",
+            "from keras_pendulum.train import train_dqn",
+            "circular imports: train.train_dqn -> train.loop -> train.train_dqn",
+        ),
+        (
+            "storage/weights.py",
+            "from keras_pendulum import __version__",
+            "storage/weights.py imports the package itself",
+        ),
+    ],
+)
+def test_wrong_import_is_reported_with_its_file(
+    file: str, line: str, problem: str, tmp_path: Path
+) -> None:
+    for path in PACKAGE.rglob("*.py"):
+        copy = tmp_path / path.relative_to(PACKAGE)
+        copy.parent.mkdir(exist_ok=True)
+        copy.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    with (tmp_path / file).open("a", encoding="utf-8") as changed:
+        changed.write(f"\n{line}\n")
+    assert problem in problems(tmp_path)

@@ -1,0 +1,94 @@
+"""Damage to a file of this package is always detected: its checksum covers every bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.train.checkpoint import load_checkpoint
+
+
+@pytest.fixture(scope="module")
+def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The checkpoint of a run with updates."""
+    folder = tmp_path_factory.mktemp("run")
+    kp.train_dqn(CONFIG, folder)
+    return (folder / "pendulum_weight.h5").read_bytes()
+
+
+CONFIG = kp.preset("reference", episodes=43, hidden_units=(16, 8), replay_capacity=1000)
+
+
+def refused(load: Callable[[Path], object], path: Path, content: bytes | bytearray) -> bool:
+    path.write_bytes(content)
+    try:
+        load(path)
+    except kp.WeightsError as error:
+        assert str(path) in str(error)
+        assert "\n" not in str(error)
+        return True
+    return False
+
+
+def resume(path: Path) -> object:
+    return load_checkpoint(path, CONFIG)
+
+
+def test_500_flipped_bits_are_all_refused(checkpoint: bytes, tmp_path: Path) -> None:
+    random = Random(0)
+    for _ in range(500):
+        flipped = bytearray(checkpoint)
+        flipped[random.randrange(len(flipped))] ^= 1 << random.randrange(8)
+        for load in (kp.load_weights, resume):
+            assert refused(load, tmp_path / "flipped.h5", flipped)
+
+
+@pytest.mark.parametrize("size", [1, 8, 512, 4096])
+def test_zeroed_blocks_are_refused(size: int, checkpoint: bytes, tmp_path: Path) -> None:
+    random = Random(size)
+    for _ in range(50):
+        start = random.randrange(len(checkpoint) - size)
+        if not any(checkpoint[start : start + size]):
+            continue  # the block was zero before
+        zeroed = checkpoint[:start] + bytes(size) + checkpoint[start + size :]
+        assert refused(kp.load_weights, tmp_path / "zeroed.h5", zeroed)
+
+
+def test_truncated_files_are_refused(checkpoint: bytes, tmp_path: Path) -> None:
+    end = checkpoint.rindex(b"\nkeras_pendulum sha256")  # of the HDF5 content
+    lengths = {
+        len(checkpoint) - 1,
+        end + 1,
+        0,
+        1,
+        7,
+        8,
+        9,
+        100,
+        511,
+        512,
+        2048,
+        end // 2,
+        end - 4096,
+        end - 8,
+        end - 1,
+    }
+    for length in sorted(lengths | set(range(0, end, 4999))):
+        assert refused(kp.load_weights, tmp_path / "short.h5", checkpoint[:length]), length
+
+
+def test_incomplete_checksum_or_bytes_behind_it_are_refused(
+    checkpoint: bytes, tmp_path: Path
+) -> None:
+    end = checkpoint.rindex(b"\nkeras_pendulum sha256")
+    for content in (checkpoint[:-1], checkpoint[: end + 1], checkpoint + b"\n"):
+        assert refused(kp.load_weights, tmp_path / "tail.h5", content)
+
+
+def test_file_without_checksum_loads(checkpoint: bytes, tmp_path: Path) -> None:
+    end = checkpoint.rindex(b"\nkeras_pendulum sha256")
+    assert not refused(resume, tmp_path / "plain.h5", checkpoint[:end])

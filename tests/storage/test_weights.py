@@ -1,0 +1,415 @@
+"""Weights files of this package, of Keras 2 and of Keras 3, and files that must be refused."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import keras
+import numpy as np
+import pytest
+from conftest import DATA
+
+import keras_pendulum as kp
+from keras_pendulum.dqn.network import Provenance
+from keras_pendulum.storage.checksum import write_with_checksum
+from keras_pendulum.storage.weights import encode_weights
+
+OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
+
+
+def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
+    provenance = Provenance("Pendulum-v1", 2.5, "reference", 7, '{"seed": 7}')
+    return kp.DQN(hidden, actions, seed=3, provenance=provenance)
+
+
+def save_unchecked(network: kp.DQN, path: Path) -> None:
+    """Saves a network that `save_weights` may refuse."""
+    write_with_checksum(path, encode_weights(network, network.get_weights()))
+
+
+def dense_layers(keras_module: Any, hidden: tuple[int, ...], actions: int) -> list[Any]:
+    layers = [keras_module.layers.Dense(units, activation="tanh") for units in hidden]
+    return [*layers, keras_module.layers.Dense(actions)]
+
+
+def subclassed(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
+    """Returns a subclassed model, as the original's, in either version of Keras."""
+
+    class Model(keras_module.Model):
+        def __init__(self) -> None:
+            super().__init__()
+            self.all = dense_layers(keras_module, hidden, actions)
+
+        def call(self, inputs: Any) -> Any:
+            for layer in self.all:
+                inputs = layer(inputs)
+            return inputs
+
+    model = Model()
+    model(OBSERVATIONS)
+    return model
+
+
+def sequential(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
+    return keras_module.Sequential(
+        [keras_module.Input((3,)), *dense_layers(keras_module, hidden, actions)]
+    )
+
+
+@pytest.fixture(scope="module")
+def keras2() -> Any:
+    return pytest.importorskip("tf_keras", reason="Keras 2 comes with the extra `test`")
+
+
+def assert_same_values(found: Any, expected: Any, tolerance: float = 0) -> None:
+    np.testing.assert_allclose(found(OBSERVATIONS), expected(OBSERVATIONS), rtol=0, atol=tolerance)
+
+
+def test_load_weights_returns_the_saved_network_with_its_provenance(tmp_path: Path) -> None:
+    saved = network()
+    kp.save_weights(saved, tmp_path / "a.h5")
+    loaded = kp.load_weights(tmp_path / "a.h5")
+    for found, expected in zip(loaded.get_weights(), saved.get_weights(), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    assert loaded.provenance == saved.provenance
+    assert (loaded.hidden_units, loaded.action_count) == ((16, 8), 5)
+    assert loaded.built
+
+
+def test_same_network_makes_the_same_file_at_any_time(tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5", evaluated_return=-1.5)
+    time.sleep(1.1)  # HDF5 can store times, in whole seconds
+    kp.save_weights(network(), tmp_path / "b.h5", evaluated_return=-1.5)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+@pytest.mark.parametrize("make", [subclassed, sequential])
+def test_keras_3_loads_a_saved_file(make: Callable[..., Any], tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    model = make(keras)
+    model.load_weights(tmp_path / "a.h5")
+    assert_same_values(model, network(), 1e-6)
+
+
+@pytest.mark.parametrize("make", [subclassed, sequential])
+def test_keras_2_loads_a_saved_file(make: Callable[..., Any], keras2: Any, tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    model = make(keras2)
+    model.load_weights(str(tmp_path / "a.h5"))
+    assert_same_values(model, network(), 1e-6)
+
+
+@pytest.mark.parametrize("make_name", ["subclassed", "sequential"])
+def test_keras_2_and_3_load_a_checkpoint(make_name: str, keras2: Any, tmp_path: Path) -> None:
+    make = {"subclassed": subclassed, "sequential": sequential}[make_name]
+    config = kp.preset("reference", episodes=42, hidden_units=(16, 8), torque_count=5)
+    result = kp.train_dqn(config, tmp_path)
+    for module in (keras, keras2):
+        model = make(module)
+        model.load_weights(str(tmp_path / "pendulum_weight.h5"))
+        assert_same_values(model, result.network, 1e-6)
+
+
+@pytest.mark.parametrize("hidden", [(512, 256, 128), (128, 64, 32)])
+@pytest.mark.parametrize("actions", [41, 7])
+def test_load_weights_reads_keras_2_files_of_other_sizes(
+    hidden: tuple[int, ...], actions: int, keras2: Any, tmp_path: Path
+) -> None:
+    model = subclassed(keras2, hidden, actions)
+    model.save_weights(str(tmp_path / "a.h5"))
+    loaded = kp.load_weights(tmp_path / "a.h5")
+    assert (loaded.hidden_units, loaded.action_count) == (hidden, actions)
+    assert_same_values(loaded, model, 1e-6)
+
+
+def test_load_weights_reads_a_keras_2_sequential(keras2: Any, tmp_path: Path) -> None:
+    layers = [keras2.layers.Flatten(), *dense_layers(keras2, (16, 8), 5)]
+    model = keras2.Sequential([keras2.Input((3,)), *layers, keras2.layers.Activation("linear")])
+    model.save_weights(str(tmp_path / "a.h5"))
+    assert_same_values(kp.load_weights(tmp_path / "a.h5"), model, 1e-6)
+
+
+@pytest.mark.parametrize("make", [subclassed, sequential])
+def test_load_weights_reads_keras_3_files(make: Callable[..., Any], tmp_path: Path) -> None:
+    # Twelve layers, because alphabetically "dense_10" comes before "dense_2".
+    model = make(keras, hidden=(6,) * 11)
+    model.compile("adam", "mse")
+    model.train_on_batch(OBSERVATIONS, np.zeros((20, 5)))  # so that it has an optimizer to save
+    model.save_weights(tmp_path / "a.weights.h5")
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), model, 1e-6)
+
+
+def test_load_weights_reads_a_keras_3_file_of_a_dqn(tmp_path: Path) -> None:
+    network().save_weights(tmp_path / "a.weights.h5")
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), network(), 0)
+
+
+def test_load_weights_orders_named_layers_by_their_sizes(tmp_path: Path) -> None:
+    model = named_layers(zebra=16, apple=8, mango=5)
+    model.save_weights(tmp_path / "a.weights.h5")
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), model, 1e-6)
+
+
+def test_layers_of_unclear_order_are_refused(tmp_path: Path) -> None:
+    named_layers(zebra=8, apple=8, mango=8, kiwi=5).save_weights(tmp_path / "a.weights.h5")
+    with pytest.raises(kp.WeightsError, match=r"order of its layers .* unclear"):
+        kp.load_weights(tmp_path / "a.weights.h5")
+
+
+def named_layers(**units: int) -> Any:
+    """Returns a Keras 3 model whose layer names do not show their order."""
+
+    class Model(keras.Model):
+        def __init__(self) -> None:
+            super().__init__()
+            for name, count in units.items():
+                activation = None if name == list(units)[-1] else "tanh"
+                setattr(self, name, keras.layers.Dense(count, activation, name=name))
+
+        def call(self, inputs: Any) -> Any:
+            for name in units:
+                inputs = getattr(self, name)(inputs)
+            return inputs
+
+    model = Model()
+    model(OBSERVATIONS)
+    return model
+
+
+def make_changed(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
+    """Returns a function that writes a valid file and changes something in it."""
+
+    def make(path: Path) -> None:
+        kp.save_weights(network(), path)
+        with h5py.File(path, "r+") as file:
+            change(file)
+
+    return make
+
+
+def replace_array(name: str, array: Any, **options: Any) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, data=array, **options)
+
+    return change
+
+
+def set_value(file: h5py.File, value: float) -> None:
+    file["dense/dense/kernel:0"][1, 2] = value
+
+
+def truncate(path: Path) -> None:
+    kp.save_weights(network(), path)
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+def other_model(path: Path) -> None:
+    model = keras.Sequential([keras.Input((8, 8, 1)), keras.layers.Conv2D(2, 3)])
+    model.save_weights(path.with_suffix(".weights.h5"))
+    path.with_suffix(".weights.h5").rename(path)
+
+
+def make_external(file: h5py.File) -> None:
+    del file["dense_1/dense_1/bias:0"]
+    storage = [("/etc/hostname", 0, 32)]
+    file.create_dataset("dense_1/dense_1/bias:0", (8,), np.float32, external=storage)
+
+
+def make_virtual(file: h5py.File) -> None:
+    layout = h5py.VirtualLayout((8,), np.float32)
+    layout[:] = h5py.VirtualSource("elsewhere.h5", "data", (8,))
+    del file["dense_1/dense_1/bias:0"]
+    file.create_virtual_dataset("dense_1/dense_1/bias:0", layout)
+
+
+def make_unwritten(file: h5py.File) -> None:
+    del file["dense_1/dense_1/bias:0"]
+    file.create_dataset("dense_1/dense_1/bias:0", (2**30,), np.float32)
+
+
+def make_too_wide(file: h5py.File) -> None:
+    replace_array("dense_1/dense_1/kernel:0", np.zeros((16, 8193), np.float32))(file)
+    replace_array("dense_1/dense_1/bias:0", np.zeros(8193, np.float32))(file)
+
+
+KERNEL = np.zeros((16, 8), np.float32)
+BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
+    "missing": (lambda path: None, "no such file"),
+    "folder": (lambda path: path.mkdir(), "not a file"),
+    "empty": (lambda path: path.write_bytes(b""), "the file is empty"),
+    "text": (lambda path: path.write_text("plain text"), "not an HDF5 file"),
+    "html": (lambda path: path.write_text("<!DOCTYPE html><html>404"), "not an HDF5 file"),
+    "lfs": (lambda path: path.write_text("version https://git-lfs.example/v1"), "not an HDF5"),
+    "truncated": (truncate, "damaged"),
+    "no layers": (lambda path: h5py.File(path, "w").close(), "holds no network weights"),
+    "other data": (
+        make_changed(lambda f: f.attrs.__delitem__("layer_names")),
+        "no network weights",
+    ),
+    "convolution": (other_model, "expected a kernel"),
+    "cartpole": (
+        lambda path: save_unchecked(kp.DQN((8,), 2, observation_size=4), path),
+        "has 4 inputs",
+    ),
+    "one output": (lambda path: save_unchecked(kp.DQN((8,), 1), path), "one output"),
+    "wrong width": (
+        make_changed(replace_array("dense_1/dense_1/kernel:0", np.zeros((17, 8), "f4"))),
+        "has 17 inputs; expected 16, the size of the previous layer",
+    ),
+    "wrong bias": (
+        make_changed(replace_array("dense_1/dense_1/bias:0", np.zeros(9, "f4"))),
+        "expected a kernel",
+    ),
+    "missing bias": (make_changed(lambda f: f.__delitem__("dense_1/dense_1/bias:0")), "damaged"),
+    "nan": (make_changed(lambda f: set_value(f, np.nan)), "NaN or infinite"),
+    "inf": (make_changed(lambda f: set_value(f, np.inf)), "NaN or infinite"),
+    "too large for float32": (
+        make_changed(replace_array("dense_1/dense_1/kernel:0", np.full((16, 8), 1e300))),
+        "NaN or infinite",
+    ),
+    "text array": (
+        make_changed(replace_array("dense_1/dense_1/kernel:0", np.full((16, 8), b"x"))),
+        "not a plain array",
+    ),
+    "integers": (
+        make_changed(replace_array("dense_1/dense_1/kernel:0", np.zeros((16, 8), "i4"))),
+        "expected floating-point",
+    ),
+    "compressed": (
+        make_changed(replace_array("dense_1/dense_1/kernel:0", KERNEL, compression="gzip")),
+        "not a plain array",
+    ),
+    "data in another file": (make_changed(make_external), "not a plain array"),
+    "virtual": (make_changed(make_virtual), "not a plain array"),
+    "declared but not stored": (make_changed(make_unwritten), "not a plain array"),
+    "too wide": (make_changed(make_too_wide), "expected 1 to 8192"),
+    "activation": (
+        make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "elu")),
+        "activation 'elu'",
+    ),
+    "environment": (
+        make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("environment", "Acrobot-v1")),
+        "records the environment 'Acrobot-v1'",
+    ),
+    "other environment": (
+        make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("environment", "CartPole-v1")),
+        "has 3 inputs; expected 4, the size of an observation",
+    ),
+    "gravity": (
+        make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("gravity", np.nan)),
+        "the recorded gravity is nan",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", BAD_FILES)
+def test_bad_file_is_refused_in_one_line_that_names_it(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.h5"
+    make, message = BAD_FILES[kind]
+    make(path)
+    before = path.read_bytes() if path.is_file() else None
+    with pytest.raises(kp.WeightsError) as caught:
+        kp.load_weights(path)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert (path.read_bytes() if path.is_file() else None) == before
+
+
+@pytest.mark.parametrize(
+    ("make", "reason"),
+    [
+        (lambda: kp.DQN((8,), 1), "the network has one output"),
+        (lambda: kp.DQN((8193,), 2), "has 8193 units; expected 1 to 8192"),
+        (lambda: kp.DQN((8,), activation="elu"), "records the activation 'elu'"),
+        (lambda: kp.DQN((8,), observation_size=4), "has 4 inputs; expected 3"),
+        (
+            lambda: kp.DQN((8,), provenance=Provenance(gravity=1000.0)),
+            "the recorded gravity is 1000",
+        ),
+        (
+            lambda: kp.DQN((8,), provenance=Provenance("Acrobot-v1")),
+            "records the environment 'Acrobot-v1'",
+        ),
+        (lambda: kp.DQN((1,) * 400), "more than 1000"),
+    ],
+)
+def test_save_weights_refuses_a_network_that_could_not_be_loaded(
+    make: Callable[[], kp.DQN], reason: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.h5"
+    kp.save_weights(network(), path)
+    with pytest.raises(kp.UserError) as caught:
+        kp.save_weights(make(), path)
+    assert str(caught.value).startswith(f"cannot write {path}: it could not be loaded, ")
+    assert reason in str(caught.value)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
+    assert_same_values(kp.load_weights(path), network())
+
+
+def test_failed_save_keeps_the_old_file(tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    with pytest.raises(kp.UserError, match="cannot write"):
+        kp.save_weights(network(), tmp_path / "a.h5" / "b.h5")
+    with pytest.raises(kp.UserError, match=r"cannot write.*folder"):
+        kp.save_weights(network(), tmp_path)
+    with pytest.raises(kp.UserError, match="cannot write"):
+        kp.save_weights(network(), tmp_path / "missing" / "a.h5")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
+    assert_same_values(kp.load_weights(tmp_path / "a.h5"), network())
+
+
+def test_full_disk_keeps_the_old_file_and_leaves_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.h5"
+    kp.save_weights(network(), path)
+
+    def full_disk(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full_disk)
+    with pytest.raises(kp.UserError, match="No space left"):
+        kp.save_weights(kp.DQN((4,)), path)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
+    assert_same_values(kp.load_weights(path), network())
+
+
+def test_save_weights_replaces_the_old_file_and_never_writes_into_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    (tmp_path / "old.h5").hardlink_to(tmp_path / "a.h5")
+    before = (tmp_path / "old.h5").read_bytes()
+    kp.save_weights(kp.DQN((4,)), tmp_path / "a.h5")
+    assert (tmp_path / "old.h5").read_bytes() == before
+    assert kp.load_weights(tmp_path / "a.h5").hidden_units == (4,)
+
+
+def test_recorded_keras_2_file_loads() -> None:
+    loaded = kp.load_weights(DATA / "pendulum_weight.keras2.h5")
+    assert (loaded.hidden_units, loaded.action_count) == ((512, 256, 128), 41)
+    assert loaded.provenance.gravity is None
+
+
+def test_find_weights_returns_a_shipped_file_unless_the_current_folder_has_that_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "reference").mkdir()  # a folder of that name is ignored
+    shipped = kp.find_weights("reference")
+    assert shipped == kp.find_weights("reference.h5")
+    provenance = kp.load_weights(shipped).provenance
+    assert (provenance.preset, provenance.seed, provenance.gravity) == ("reference", 0, 1.0)
+    (tmp_path / "reference.h5").touch()
+    assert kp.find_weights("reference.h5") == Path("reference.h5")
+    with pytest.raises(kp.WeightsError, match="folder/reference: no such file"):
+        kp.find_weights("folder/reference")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(kp.WeightsError, match="folder: not a file"):
+        kp.find_weights("folder")

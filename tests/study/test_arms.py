@@ -1,0 +1,77 @@
+"""The arms of the default study and the user's own arms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.errors import ConfigError
+from keras_pendulum.study.arms import default_arms, own_arms
+from keras_pendulum.study.figure import STYLES
+
+
+def test_default_study_goes_from_original_to_reference_one_change_at_a_time() -> None:
+    arms = {arm.name: arm for arm in default_arms()}
+    ladder = list(arms.values())[: list(arms).index("reference") + 1]
+    assert ladder[0].config == kp.preset("original")
+    assert replace(ladder[-1].config, preset="reference") == kp.preset("reference")
+    for before, after in pairwise(ladder):
+        changed = [
+            name
+            for name in kp.Config.__dataclass_fields__
+            if getattr(before.config, name) != getattr(after.config, name)
+        ]
+        assert len(changed) == 1
+        assert after.baseline == before.name
+
+
+def test_default_study_leaves_each_change_out_of_reference() -> None:
+    arms = default_arms()
+    left_out = [arm for arm in arms if arm.name.startswith("reference without ")]
+    assert len(left_out) == len([arm for arm in arms if arm.name.startswith("+")]) + 1
+    assert all(arm.baseline == "reference" for arm in left_out)
+    assert len({arm.training_config for arm in arms}) == len(arms) - 1
+    assert len({arm.slug for arm in arms}) == len(arms)
+
+
+def test_each_curve_of_the_default_study_has_its_own_colour() -> None:
+    assert len([arm for arm in default_arms() if arm.has_curve]) <= len(STYLES)
+
+
+def test_arms_that_differ_only_in_save_every_share_their_runs() -> None:
+    one, two, three = own_arms(
+        ["reference"], ["seldom: reference save_every=7", "less: reference discount=0.5"]
+    )
+    assert one.config != two.config
+    assert one.training_config == two.training_config != three.training_config
+
+
+def test_own_arm_is_a_preset_with_settings() -> None:
+    one, two, three = own_arms(
+        ["reference", "cartpole"], ["small: reference hidden_units=8,4 gravity=1 discount=0.5"]
+    )
+    assert three.config == kp.preset("reference", hidden_units=(8, 4), discount=0.5)
+    assert (one.baseline, two.baseline, three.baseline) == (None, None, "reference")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("nothing", "is not of the form"),
+        ("a: nonsense", "unknown preset 'nonsense'"),
+        ("a: reference colour=red", "unknown setting colour"),
+        ("a: reference episodes=ten", "episodes is 'ten'; expected a whole number"),
+        ("a: reference episodes=-1", "episodes is -1"),
+        ("a: reference episodes", "expected field=value"),
+        ("a: reference seed=3", "cannot set seed"),
+        ("reference: original", "two arms have the name"),
+        (f"{'n' * 101}: original", "longer than 100 letters"),
+    ],
+)
+def test_wrong_arm_is_a_config_error_of_one_line(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message) as caught:
+        own_arms(["reference"], [text])
+    assert "\n" not in str(caught.value)

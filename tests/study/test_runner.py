@@ -1,0 +1,150 @@
+"""The loop that hands out jobs, with a Dask worker in a thread of this process."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from distributed import Client, LocalCluster
+
+from keras_pendulum.config.presets import preset
+from keras_pendulum.errors import UserError
+from keras_pendulum.study import __main__ as study_command
+from keras_pendulum.study import dask_workers
+from keras_pendulum.study import job as job_module
+from keras_pendulum.study.job import Job, Reply, RunResult, encode
+from keras_pendulum.study.runner import run_all
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    with (
+        LocalCluster(
+            processes=False, n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0"
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def make_job(seed: int) -> Job:
+    return Job("arm", "arm", preset("reference", seed=seed), {})
+
+
+def reply(job: Job) -> Reply:
+    """Returns a reply without training."""
+    return Reply(encode(job, RunResult(0.0, [-1.5], [-0.1], [-1.5])), 1.0, 2.0, 4.0, "host:7")
+
+
+def flaky_work(
+    attempts: Path, error: Exception, failures: dict[int, int]
+) -> Callable[[Job], Reply]:
+    """Returns work that fails in the first attempts of some seeds, and counts all attempts."""
+
+    def work(job: Job) -> Reply:
+        seed = job.config.seed
+        with open(attempts, "a") as file:
+            file.write(f"{seed}\n")
+        if attempts.read_text().split().count(str(seed)) <= failures.get(seed, 0):
+            raise error
+        return reply(job)
+
+    return work
+
+
+def test_failing_job_is_repeated_twice_and_the_others_continue(
+    client: Client, tmp_path: Path
+) -> None:
+    work = flaky_work(tmp_path / "attempts", OSError("no\ndisk"), {1: 2, 2: 99})
+    lines: list[str] = []
+    finished = {
+        each.job.config.seed: each
+        for each in run_all(client, work, map(make_job, range(5)), lines.append)
+    }
+    attempts = sorted((tmp_path / "attempts").read_text().split())
+    assert attempts == ["0", "1", "1", "1", "2", "2", "2", "3", "4"]
+    assert [seed for seed, each in finished.items() if each.reply is None] == [2]
+    assert finished[2].problem == "OSError: no disk"
+    assert finished[1].reply == reply(make_job(1))
+    assert sorted(lines) == [
+        f"arm, seed {seed}: repeated after OSError: no disk" for seed in (1, 1, 2, 2)
+    ]
+
+
+def test_user_error_is_not_repeated(client: Client, tmp_path: Path) -> None:
+    work = flaky_work(tmp_path / "attempts", UserError("the loss is nan"), {0: 99})
+    (finished,) = run_all(client, work, [make_job(0)])
+    assert (finished.reply, finished.problem) == (None, "the loss is nan")
+    assert (tmp_path / "attempts").read_text() == "0\n"
+
+
+class UnpicklableError(Exception):
+    def __reduce__(self) -> str:
+        raise TypeError("no pickle")
+
+
+def test_exception_that_does_not_pickle_is_reported(client: Client) -> None:
+    def work(job: Job) -> Reply:
+        raise UnpicklableError("oops")
+
+    (finished,) = run_all(client, work, [make_job(0)])
+    assert "UnpicklableError('oops')" in finished.problem
+
+
+def test_each_worker_has_one_job_at_a_time(client: Client) -> None:
+    handed_out = []
+
+    def jobs() -> Iterator[Job]:
+        for seed in range(50):
+            handed_out.append(seed)
+            yield make_job(seed)
+
+    runs = run_all(client, reply, jobs())
+    next(runs)
+    assert len(handed_out) == 2
+    assert len(list(runs)) == 49
+
+
+def test_failed_runs_are_reported_and_the_next_study_retries_them(
+    client: Client,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def diverge(job: Job) -> Reply:
+        if (job.arm, job.config.seed) == ("starved", 0):
+            raise UserError("the loss is nan")
+        return reply(job)
+
+    @contextmanager
+    def local_workers(count: int) -> Iterator[Client]:
+        yield client
+
+    monkeypatch.setattr(dask_workers, "local_workers", local_workers)
+    monkeypatch.setattr(job_module, "train_and_score", diverge)
+    words = ["--arm", "small: reference", "--arm", "starved: original", "--seeds", "2"]
+    words += ["--out", str(tmp_path / "study")]
+    assert study_command.main(words) == 1
+    printed = capsys.readouterr()
+    assert printed.err == (
+        "starved, seed 0: failed, the loss is nan\n"
+        "error: 1 of 4 runs failed (starved, seed 0: the loss is nan); run the same command again "
+        "to retry them\n"
+    )
+    assert re.findall(r"^(.*): regret 1\.50, 4\.0 s, (\d/\d)", printed.out, re.M) == [
+        ("small, seed 0", "1/4"),
+        ("small, seed 1", "2/4"),
+        ("starved, seed 1", "3/4"),
+    ]
+
+    monkeypatch.setattr(job_module, "train_and_score", reply)
+    assert study_command.main(words) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    assert printed.out.startswith(
+        "3 of 4 runs are already finished\nstarved, seed 0: regret 1.50, "
+    )
+    assert ", 4/4, 0:00 left\n" in printed.out

@@ -1,0 +1,229 @@
+"""The Keras agent and its PyTorch twin (torch_agent.py) compute the same numbers.
+
+Each limit is next to what was measured. Most of the difference comes from Adam's bias corrections:
+Keras rounds them to float32, PyTorch computes them in float64, which changes a step by up to 1e-5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import torch_agent
+from conftest import Recorded
+from numpy.typing import NDArray
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.presets import preset
+from keras_pendulum.dqn import losses as keras_losses
+from keras_pendulum.dqn.network import DQN
+from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.train.run import make_optimizer, make_run
+
+torch.set_num_threads(1)  # the order of a sum, and so its rounding, depends on the threads
+
+Weights = list[NDArray[np.float32]]
+
+
+def take(transitions: Transitions, steps: NDArray[np.integer]) -> Transitions:
+    """Returns the transitions with these step numbers, in the shape of `steps`."""
+    return Transitions(*(field[steps] for field in transitions))
+
+
+def to_torch(batches: Transitions) -> torch_agent.Transitions:
+    return torch_agent.Transitions(*map(torch.from_numpy, batches))
+
+
+def twin_agent(config: Config, weights: Weights) -> torch_agent.Agent:
+    """Returns the PyTorch agent of the same settings."""
+    learning_rate = torch_agent.constant_rate(config.learning_rate)
+    if config.learning_rate_schedule == "cosine":
+        learning_rate = torch_agent.cosine_rate(config.learning_rate, config.total_updates)
+    update_target = {
+        "none": torch_agent.no_update,
+        "soft": torch_agent.soft_update(config.tau),
+        "hard": torch_agent.hard_update(config.target_period),
+    }[config.target_update]
+    online = torch_agent.from_keras(weights)
+    return torch_agent.Agent(
+        online,
+        online if config.target_update == "none" else torch_agent.from_keras(weights),
+        update_target,
+        torch_agent.KerasAdam(online.parameters(), learning_rate),
+        {"squared": torch_agent.mean_squared_error, "huber": torch_agent.huber}[config.loss],
+        config.discount,
+        config.double_q,
+    )
+
+
+def largest_difference(one: Iterable[NDArray[Any]], other: Iterable[NDArray[Any]]) -> float:
+    return float(np.max([abs(a - b).max() for a, b in zip(one, other, strict=True)]))
+
+
+def recorded_weights(recorded: Recorded, when: str) -> Weights:
+    return [recorded[f"{when}_weight_{index}"] for index in range(8)]
+
+
+@pytest.mark.parametrize(
+    ("config", "terminated_share"),
+    [
+        (preset("original", seed=1), 0.0),
+        (preset("reference", seed=1), 0.1),
+        # Period 7, so that the 10 updates between comparisons end at every phase of it; 48
+        # episodes make 210 updates, so that the cosine nearly reaches 0 within the 200.
+        (preset(target_update="hard", target_period=7, episodes=48, seed=1), 0.1),
+        (preset(double_q=True, tau=0.01, seed=1), 0.1),
+    ],
+    ids=["original", "reference", "hard target", "double"],
+)
+def test_200_updates_give_the_same_losses_and_weights(
+    config: Config, terminated_share: float, recorded_transitions: Transitions
+) -> None:
+    random = np.random.default_rng(1)
+    steps = random.integers(len(recorded_transitions.action), size=(20, 10, 32))
+    # The pendulum never terminates, so random transitions are marked as terminated.
+    terminated = random.random(steps.shape) < terminated_share
+    agent = make_run(config).agent
+    twin = twin_agent(config, agent.online.get_weights())
+    for call in range(20):
+        batches = take(recorded_transitions, steps[call])  # [10, 32, ...]
+        batches = batches._replace(terminated=terminated[call])
+        losses, twin_losses = agent.update(batches), twin.update(to_torch(batches))
+        # Measured: at most 2.7e-6 in the losses and 6.8e-6 in the weights, which move by 0.1.
+        np.testing.assert_allclose(twin_losses, losses, rtol=0, atol=1e-5)
+        for network, twin_network in ((agent.online, twin.online), (agent.target, twin.target)):
+            twin_weights = torch_agent.to_keras(twin_network)
+            assert largest_difference(twin_weights, network.get_weights()) < 2e-5
+
+
+def learn_recorded_batches(
+    recorded: Recorded,
+    recorded_transitions: Transitions,
+    epsilon: Callable[[int], float] = torch_agent.keras_epsilon,
+) -> tuple[NDArray[np.float32], Weights]:
+    """Makes the recorded run's updates in PyTorch; returns losses [459] and final weights."""
+    network = torch_agent.from_keras(recorded_weights(recorded, "initial"))
+    agent = torch_agent.Agent(
+        network,
+        network,
+        torch_agent.no_update,
+        torch_agent.KerasAdam(network.parameters(), torch_agent.constant_rate(1e-3), epsilon),
+        torch_agent.mean_squared_error,
+        discount=0.9,
+    )
+    losses = agent.update(to_torch(take(recorded_transitions, recorded["batch"])))
+    return losses, torch_agent.to_keras(network)
+
+
+def test_torch_repeats_the_updates_of_the_recorded_run(
+    recorded: Recorded, recorded_transitions: Transitions
+) -> None:
+    losses, weights = learn_recorded_batches(recorded, recorded_transitions)
+    # Measured: 8.0e-6 in the losses (0.006 to 1.03), 2.4e-5 in the weights, which move by 0.2.
+    np.testing.assert_allclose(losses, recorded["loss"], rtol=0, atol=2.5e-5)
+    assert largest_difference(weights, recorded_weights(recorded, "final")) < 5e-5
+
+
+def test_torch_with_its_own_epsilon_does_not_repeat_the_recorded_run(
+    recorded: Recorded, recorded_transitions: Transitions
+) -> None:
+    losses, weights = learn_recorded_batches(
+        recorded, recorded_transitions, epsilon=lambda step: 1e-7
+    )
+    # Measured: 6.9e-4 in the first 20 losses, 0.026 in the final weights.
+    assert abs(losses - recorded["loss"])[:20].max() > 1e-4
+    assert largest_difference(weights, recorded_weights(recorded, "final")) > 1e-3
+
+
+def test_keras_weights_in_torch_give_the_same_q_values(recorded: Recorded) -> None:
+    weights = recorded_weights(recorded, "final")
+    observations = recorded["probe_observations"]  # [64, 3]
+    network = DQN()
+    network.set_weights(weights)
+    with torch.no_grad():
+        q_values = torch_agent.from_keras(weights)(torch.from_numpy(observations)).numpy()
+    np.testing.assert_allclose(q_values, network(observations), rtol=0, atol=1e-5)
+    np.testing.assert_allclose(q_values, recorded["probe_q_values"], rtol=0, atol=1e-5)
+
+
+def test_torch_weights_in_keras_give_the_same_q_values(recorded: Recorded) -> None:
+    observations = recorded["probe_observations"]
+    torch.manual_seed(0)
+    twin = torch_agent.DQN((3, 512, 256, 128, 41))
+    network = DQN()
+    network.set_weights(torch_agent.to_keras(twin))
+    with torch.no_grad():
+        q_values = twin(torch.from_numpy(observations)).numpy()
+    np.testing.assert_allclose(network(observations), q_values, rtol=0, atol=1e-5)
+
+
+def test_weights_are_the_same_after_the_way_to_torch_and_back(recorded: Recorded) -> None:
+    weights = recorded_weights(recorded, "final")
+    converted = torch_agent.to_keras(torch_agent.from_keras(weights))
+    for actual, expected in zip(converted, weights, strict=True):
+        assert actual.dtype == expected.dtype
+        np.testing.assert_array_equal(actual, expected)
+
+
+def test_targets_and_losses_agree_with_torch_on_random_input() -> None:
+    random = np.random.default_rng(0)
+    q, next_q, next_q_online = random.normal(-20, 10, (3, 256, 41)).astype(np.float32)
+    reward = random.uniform(-16, 0, 256).astype(np.float32)
+    action = random.integers(41, size=256, dtype=np.int32)
+    terminated = random.random(256) < 0.25
+    outcome = (reward, terminated, next_q)
+    twin_reward, twin_terminated, twin_next_q = map(torch.from_numpy, outcome)
+    target = keras_losses.td_target(*outcome, 0.9)
+    twin_target = torch_agent.td_target(twin_reward, twin_terminated, twin_next_q, 0.9)
+    np.testing.assert_allclose(twin_target, target, rtol=1e-6)
+    double_target = keras_losses.double_td_target(*outcome, next_q_online, 0.9)
+    twin_double_target = torch_agent.double_td_target(
+        twin_reward, twin_terminated, twin_next_q, torch.from_numpy(next_q_online), 0.9
+    )
+    np.testing.assert_allclose(twin_double_target, double_target, rtol=1e-6)
+    near_q = q.copy()  # half of the TD errors within 1, where the Huber loss is a square
+    near_q[np.arange(128), action[:128]] = target.numpy()[:128] + random.uniform(-1, 1, 128)
+    for values in (q, near_q):
+        batch = (values, action, target.numpy())
+        for name in ("mean_squared_error", "huber"):
+            twin_loss = getattr(torch_agent, name)(*map(torch.from_numpy, batch))
+            loss = getattr(keras_losses, name)(*batch)
+            np.testing.assert_allclose(twin_loss, loss, rtol=1e-6)
+
+
+def test_target_and_loss_agree_with_numbers_computed_by_hand() -> None:
+    reward = np.array([1, -2], np.float32)
+    terminated = np.array([False, True])
+    next_q = np.array([[1, 4, 2], [5, 6, 7]], np.float32)
+    q = np.array([[0, 1, 2], [3, 4, 5]], np.float32)
+    action = np.array([1, 0], np.int32)
+    expected_target = [1 + 0.5 * 4, -2]  # the second row is terminated
+    expected_loss = ((3 - 1) ** 2 + (-2 - 3) ** 2) / 6  # over 2 rows of 3 outputs
+
+    target = keras_losses.td_target(reward, terminated, next_q, 0.5)
+    np.testing.assert_array_equal(target, expected_target)
+    loss = keras_losses.mean_squared_error(q, action, target)
+    assert float(loss) == pytest.approx(expected_loss)
+
+    outputs = torch.tensor(q, requires_grad=True)
+    twin_target = torch_agent.td_target(
+        torch.from_numpy(reward), torch.from_numpy(terminated), torch.from_numpy(next_q), 0.5
+    )
+    np.testing.assert_array_equal(twin_target, expected_target)
+    twin_loss = torch_agent.mean_squared_error(outputs, torch.from_numpy(action), twin_target)
+    assert twin_loss.item() == pytest.approx(expected_loss)
+    (gradient,) = torch.autograd.grad(twin_loss, outputs)
+    np.testing.assert_allclose(gradient, [[0, -4 / 6, 0], [10 / 6, 0, 0]], rtol=1e-6)
+
+
+def test_cosine_rate_is_that_of_the_keras_optimizer() -> None:
+    config = preset(hidden_units=(4,), episodes=44)
+    optimizer: Any = make_optimizer(config)
+    optimizer.build(DQN((4,)).trainable_variables)
+    rate = torch_agent.cosine_rate(config.learning_rate, config.total_updates)
+    for steps in (0, 1, 30, 45, 89, 90, 91, 200):  # 90 is the last
+        optimizer.iterations.assign(steps)
+        assert float(optimizer.learning_rate) == pytest.approx(rate(steps), abs=1e-9)

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import Command
+
+from keras_pendulum.errors import UserError
+from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.train import live_plot
+
+pygame = pytest.importorskip("pygame")
+
+
+def record(episode: int) -> EpisodeRecord:
+    return EpisodeRecord(episode, 1.0, 10.0 * episode, 0.5, 0.1, 10 * episode, episode, 0.1)
+
+
+@pytest.fixture
+def window(monkeypatch: pytest.MonkeyPatch) -> live_plot.LivePlot:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    monkeypatch.setattr(live_plot, "_SECONDS_BETWEEN", 0.0)
+    return live_plot.LivePlot()
+
+
+def window_pixels() -> np.ndarray:
+    """Returns the pixels of the window [W, H, 3]."""
+    return pygame.surfarray.array3d(pygame.display.get_surface())
+
+
+def test_window_shows_the_curve_and_each_new_episode(window: live_plot.LivePlot) -> None:
+    window(record(0))
+    window(record(1))
+    before = window_pixels()
+    assert before.shape == (960, 540, 3)
+    assert len(np.unique(before.reshape(-1, 3), axis=0)) > 10  # not an empty window
+    window(record(2))
+    assert (window_pixels() != before).any()
+    pygame.display.quit()
+
+
+def test_finish_draws_episodes_since_the_last_drawing(
+    window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window(record(0))
+    before = window_pixels()
+    monkeypatch.setattr(live_plot, "_SECONDS_BETWEEN", 1e9)
+    window(record(1))
+    assert (window_pixels() == before).all()
+    window.finish()
+    assert (window_pixels() != before).any()
+    pygame.display.quit()
+
+
+def test_closed_window_is_not_opened_again(window: live_plot.LivePlot) -> None:
+    window(record(0))
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    window(record(1))
+    assert not pygame.display.get_init()
+    window(record(2))
+    window.finish()
+    assert not pygame.display.get_init()
+
+
+def test_live_plot_without_a_display_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(UserError, match="no display"):
+        live_plot.LivePlot()
+
+
+def test_train_live_without_a_display_prints_one_line_and_trains(command: Command) -> None:
+    no_display = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
+    words = ["--live", "--preset", "original", "--episodes", "2", "--hidden-units", "8"]
+    done = command("train", *words, environment=no_display)
+    assert done.returncode == 0
+    assert done.stderr.startswith("no live plot: there is no display")
+    assert done.stderr.count("\n") == 1
+    assert "Trained 2 episodes" in done.stdout
+
+
+def test_train_render_shows_the_environment(command: Command) -> None:
+    words = ["--render", "--preset", "cartpole-original", "--episodes", "2"]
+    done = command("train", *words, environment={"SDL_VIDEODRIVER": "dummy"})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Trained 2 episodes" in done.stdout

@@ -1,0 +1,185 @@
+"""The training loop: episodes, stored transitions, updates, and what stops it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.wrappers import TimeLimit
+
+import keras_pendulum as kp
+from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.train.loop import train_episodes
+from keras_pendulum.train.run import Run, make_run
+
+
+def trained(name: str, **changes: Any) -> Run:
+    """Returns a run of a small network after its last episode."""
+    run = make_run(kp.preset(name, hidden_units=(8,), **changes))
+    list(train_episodes(run))
+    return run
+
+
+def updates(run: Run) -> list[int]:
+    """Returns the updates of each episode."""
+    totals = [record.updates for record in run.history]
+    return np.diff(totals, prepend=0).tolist()
+
+
+def stored(run: Run) -> Transitions:
+    """Returns the transitions in the replay buffer, oldest first."""
+    return Transitions(**run.replay.get_state())
+
+
+def test_original_makes_459_updates_in_500_episodes() -> None:
+    run = trained("original", max_episode_steps=2)
+    assert updates(run) == [0] * 41 + [1] * 459
+    assert int(run.agent.optimizer.iterations) == 459
+    assert [math.isnan(record.loss) for record in run.history] == [True] * 41 + [False] * 459
+
+
+@pytest.mark.parametrize("warmup", [0, 1, 2])
+def test_updates_begin_after_the_warmup_with_every_stored_transition(warmup: int) -> None:
+    # The largest batch that the Config allows.
+    run = trained(
+        "reference",
+        episodes=4,
+        warmup_episodes=warmup,
+        max_episode_steps=5,
+        batch_size=5 * (warmup + 1),
+        updates_per_episode=3,
+    )
+    assert updates(run) == [0] * warmup + [3] * (4 - warmup)
+    assert run.history[-1].updates == run.config.total_updates
+
+
+def test_train_frequency_step_makes_one_update_for_each_step_from_the_first_full_batch() -> None:
+    run = trained("original", train_frequency="step", episodes=4, max_episode_steps=4, batch_size=6)
+    # Transition 6 is the second of episode 1. The warmup belongs to train_frequency episode.
+    assert updates(run) == [0, 3, 4, 4]
+
+
+def test_cartpole_makes_one_update_for_each_step_from_the_first_full_batch() -> None:
+    run = trained("cartpole-original", episodes=12)
+    steps = run.history[-1].environment_steps
+    assert steps > 128
+    assert run.history[-1].updates == steps - 127
+
+
+def test_no_update_is_made_while_the_buffer_has_less_than_a_batch() -> None:
+    # The length of a CartPole episode is not known before, so the Config cannot refuse this.
+    run = trained("cartpole", episodes=20, warmup_episodes=0, updates_per_episode=2)
+    assert updates(run) == [2 * (record.environment_steps >= 128) for record in run.history]
+    assert updates(run)[0] == 0
+    assert updates(run)[-1] == 2
+
+
+def test_loss_of_a_record_is_the_mean_of_its_updates(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = make_run(
+        kp.preset("original", hidden_units=(8,), episodes=1, warmup_episodes=0, batch_size=3)
+    )
+    monkeypatch.setattr(run.agent, "update", lambda batches: np.array([1.0, 2.0, 6.0]))
+    (record,) = train_episodes(run)
+    assert (record.loss, record.updates) == (3.0, 3)
+
+
+def test_record_has_the_numbers_of_its_episode() -> None:
+    run = trained("original", episodes=3, max_episode_steps=7)
+    rewards = stored(run).reward.reshape(3, 7)
+    for episode, record in enumerate(run.history):
+        assert isinstance(record, EpisodeRecord)
+        assert record.episode == episode
+        assert record.environment_steps == 7 * (episode + 1)
+        assert record.episode_return == pytest.approx(rewards[episode].sum(), rel=1e-6)
+        assert record.average_reward == record.episode_return / 7
+        assert record.epsilon == run.epsilon(episode, 0)
+        assert record.seconds > 0
+
+
+def test_epsilon_of_a_record_is_that_of_the_last_step() -> None:
+    run = trained("cartpole-original", episodes=3)
+    for record in run.history:
+        assert record.epsilon == run.epsilon(0, record.environment_steps - 1)
+
+
+def test_training_continues_after_the_last_record_of_the_history() -> None:
+    config = kp.preset("original", hidden_units=(8,), episodes=3, max_episode_steps=3)
+    run = make_run(config)
+    first = next(train_episodes(run))
+    assert run.history == [first]
+    assert [record.episode for record in train_episodes(run)] == [1, 2]
+    assert [record.episode for record in run.history] == [0, 1, 2]
+    assert list(train_episodes(run)) == []
+
+
+def test_transitions_are_stored_in_the_order_of_the_steps() -> None:
+    run = trained("reference", episodes=2, max_episode_steps=5)
+    observation, _, _, next_observation, terminated = stored(run)
+    for first in (0, 5):
+        np.testing.assert_array_equal(
+            observation[first + 1 : first + 5], next_observation[first : first + 4]
+        )
+    assert (observation[5] != next_observation[4]).any()  # a new episode
+    assert not terminated.any()
+
+
+def test_fallen_pole_is_terminated_and_the_step_limit_is_not() -> None:
+    fallen = trained("cartpole-original", episodes=3)
+    ends = [record.environment_steps - 1 for record in fallen.history]
+    assert np.flatnonzero(stored(fallen).terminated).tolist() == ends
+    truncated = trained("cartpole-original", episodes=3, max_episode_steps=4)
+    assert [record.environment_steps for record in truncated.history] == [4, 8, 12]
+    assert not stored(truncated).terminated.any()
+
+
+def test_rewards_are_scaled_in_the_buffer_and_not_in_the_records() -> None:
+    plain, scaled = (trained("reference", episodes=1, reward_scale=scale) for scale in (1.0, 0.5))
+    np.testing.assert_allclose(stored(scaled).reward, 0.5 * stored(plain).reward)
+    assert scaled.history[0].episode_return == plain.history[0].episode_return
+
+
+def test_another_seed_starts_in_another_state() -> None:
+    first, second = (
+        trained("original", seed=seed, episodes=1, max_episode_steps=1) for seed in (0, 1)
+    )
+    assert (stored(first).observation != stored(second).observation).all()
+
+
+def test_loss_that_is_not_finite_stops_the_run() -> None:
+    initial = kp.DQN((8,))
+    initial.head.bias.assign(np.full(41, 1e25))  # its square is beyond float32
+    run = make_run(kp.preset("original", hidden_units=(8,), episodes=60), initial)
+    message = r"^episode 41, step 200: the loss is inf, learning has diverged; try a smaller "
+    with pytest.raises(kp.UserError, match=message):
+        list(train_episodes(run))
+    assert len(run.history) == 41
+
+
+@pytest.mark.parametrize("name", ["original", "cartpole-original"])
+@pytest.mark.parametrize("broken", ["observation", "reward"])
+def test_number_that_is_not_finite_stops_the_run_at_its_step(
+    name: str, broken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    last = trained(name, episodes=3).history[2].environment_steps + 5  # the 5th of episode 3
+    steps = itertools.count(1)
+    step = TimeLimit.step
+
+    def breaking(env: Any, action: Any) -> tuple[Any, ...]:
+        observation, reward, *rest = step(env, action)
+        if next(steps) == last:
+            if broken == "reward":
+                reward = float("inf")
+            else:
+                observation[-1] = np.nan
+        return observation, reward, *rest
+
+    monkeypatch.setattr(TimeLimit, "step", breaking)
+    run = make_run(kp.preset(name, hidden_units=(8,), episodes=9))
+    with pytest.raises(kp.UserError, match=f"^episode 3, step 5: the environment .*{broken}"):
+        list(train_episodes(run))
+    assert len(run.history) == 3
+    assert run.replay.added == last - 1

@@ -1,0 +1,140 @@
+"""The parts of a run, made from its Config."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+import keras
+import numpy as np
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.dqn.exploration import make_schedule
+from keras_pendulum.dqn.losses import huber, mean_squared_error
+from keras_pendulum.dqn.network import Provenance
+from keras_pendulum.environments.actions import DiscreteActions, TorqueGrid, TruncatingTorqueGrid
+from keras_pendulum.train.run import make_optimizer, make_run
+
+
+@pytest.mark.parametrize(
+    ("name", "actions", "loss", "observation_size"),
+    [
+        ("reference", TorqueGrid, mean_squared_error, 3),
+        ("walkthrough", TruncatingTorqueGrid, mean_squared_error, 3),
+        ("cartpole", DiscreteActions, huber, 4),
+    ],
+)
+def test_run_has_the_parts_of_its_settings(
+    name: str, actions: type, loss: object, observation_size: int
+) -> None:
+    config = kp.preset(name, seed=5, hidden_units=(8, 4), max_episode_steps=7, replay_capacity=300)
+    run = make_run(config)
+    assert run.config == config
+    assert type(run.actions) is actions
+    assert run.agent.online.hidden_units == (8, 4)
+    assert run.agent.online.action_count == run.actions.count
+    assert run.agent.online.observation_size == observation_size
+    assert (run.agent.loss, run.agent.discount) == (loss, config.discount)
+    assert run.agent.double_q == config.double_q
+    assert (run.agent.target is run.agent.online) == (config.target_update == "none")
+    assert run.agent.rng is run.streams.exploration
+    assert (run.replay.capacity, len(run.replay)) == (300, 0)
+    assert run.epsilon == make_schedule(config)
+    assert run.env.get_wrapper_attr("_max_episode_steps") == 7
+    assert run.history == []
+
+
+def test_gravity_reaches_the_environment() -> None:
+    simulation: Any = make_run(kp.preset("swingup", hidden_units=(8,))).env.unwrapped
+    assert simulation.g == 10.0
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "decay"),
+    [("adam", keras.optimizers.Adam, None), ("adamw", keras.optimizers.AdamW, 0.03)],
+)
+@pytest.mark.parametrize("clip", [None, 100.0])
+def test_optimizer_has_the_numbers_of_the_settings(
+    name: str, kind: Any, decay: float | None, clip: float | None
+) -> None:
+    numbers: dict[str, Any] = {
+        "learning_rate": 0.25,
+        "optimizer_epsilon": 0.5,
+        "weight_decay": 0.03,
+    }
+    config = kp.preset("original", optimizer=name, gradient_clip=clip, **numbers)
+    optimizer: Any = make_optimizer(config)
+    assert type(optimizer) is kind
+    assert (float(optimizer.learning_rate), optimizer.epsilon) == (0.25, 0.5)
+    assert (optimizer.weight_decay, optimizer.clipvalue) == (decay, clip)
+    assert optimizer.amsgrad == (name == "adamw")
+
+
+@pytest.mark.parametrize(
+    ("schedule", "rates"), [("cosine", [1e-3, 0.5e-3, 0, 0]), ("constant", [1e-3] * 4)]
+)
+def test_learning_rate_follows_its_schedule(schedule: str, rates: list[float]) -> None:
+    config = kp.preset("reference", episodes=44, learning_rate_schedule=schedule)
+    assert config.total_updates == 90
+    run = make_run(config)
+    found = []
+    for updates in (0, 45, 90, 91):
+        run.agent.optimizer.iterations.assign(updates)
+        found.append(float(run.agent.optimizer.learning_rate))
+    np.testing.assert_allclose(found, rates, atol=1e-10)
+
+
+def test_run_without_updates_has_a_learning_rate() -> None:
+    run = make_run(kp.preset("reference", episodes=3))
+    assert run.config.total_updates == 0
+    assert float(run.agent.optimizer.learning_rate) == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize(("name", "gravity"), [("swingup", 10.0), ("cartpole-original", None)])
+def test_network_records_the_run_that_it_comes_from(name: str, gravity: float | None) -> None:
+    config = kp.preset(name, hidden_units=(8,), seed=6)
+    settings = json.dumps(asdict(config))
+    found = make_run(config).agent.online.provenance
+    assert found == Provenance(config.environment, gravity, name, 6, settings)
+
+
+def test_another_seed_gives_other_initial_weights() -> None:
+    first, second = (
+        make_run(kp.preset("original", seed=seed, hidden_units=(8,))).agent for seed in (0, 1)
+    )
+    assert (first.online.get_weights()[0] != second.online.get_weights()[0]).all()
+
+
+def test_initial_network_replaces_the_seeded_weights() -> None:
+    initial = kp.DQN((8,), seed=77)
+    agent = make_run(kp.preset("reference", hidden_units=(8,)), initial).agent
+    assert agent.online is not initial
+    assert agent.online.provenance.preset == "reference"
+    for network in (agent.online, agent.target):
+        for ours, theirs in zip(network.get_weights(), initial.get_weights(), strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+    observation = np.array([1, 0, 0], np.float32)
+    q = initial(observation[np.newaxis]).numpy()[0]
+    np.testing.assert_allclose(agent.policy.q_values(observation), q, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("initial", "message"),
+    [
+        (kp.DQN((8,)), "has layers 8-41, the settings say 512-256-128-41"),
+        (kp.DQN((512, 256, 128), 5), "has layers 512-256-128-5, the settings say 512-256-128-41"),
+        (
+            kp.DQN((512, 256, 128), activation="relu"),
+            "has activation relu, the settings say tanh",
+        ),
+        (
+            kp.DQN((8,), 2, observation_size=4, provenance=Provenance("CartPole-v1")),
+            "has environment CartPole-v1, the settings say Pendulum-v1",
+        ),
+    ],
+)
+def test_initial_network_of_another_shape_is_refused(initial: kp.DQN, message: str) -> None:
+    with pytest.raises(kp.ConfigError, match=f"^the initial network {message}"):
+        make_run(kp.preset("original"), initial)

@@ -1,0 +1,294 @@
+"""The files of a run in its folder; files of other runs and users are not changed."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.train.checkpoint import (
+    CheckpointWriter,
+    load_checkpoint,
+    save_checkpoint,
+)
+from keras_pendulum.train.run_folder import RunFolder
+
+
+def test_run_leaves_its_four_files(tmp_path: Path) -> None:
+    config = kp.preset("reference", episodes=46)
+    result = kp.train_dqn(config, tmp_path / "new" / "folder")
+    folder = tmp_path / "new" / "folder"
+    assert {file.name for file in folder.iterdir()} == {
+        "pendulum_weight.h5",
+        "history.csv",
+        "config.json",
+        "rewards.png",
+    }
+    settings = json.loads((folder / "config.json").read_text())
+    assert kp.Config(**{**settings, "hidden_units": tuple(settings["hidden_units"])}) == config
+
+    with open(folder / "history.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert ",".join(rows[0]) == (
+        "episode,average_reward,return,epsilon,loss,environment_steps,updates,seconds"
+    )
+    assert len(rows) == 46
+    assert [float(row["return"]) for row in rows] == [r.episode_return for r in result.history]
+    assert rows[40]["loss"] == ""
+    assert float(rows[41]["loss"]) > 0
+    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "150")
+
+    picture = matplotlib.image.imread(folder / "rewards.png")
+    assert picture.shape[0] > 300
+    assert picture[..., :3].std() > 0.05  # not a blank picture
+
+
+def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=24, hidden_units=(8,))
+    contents: list[bytes] = []
+
+    def write(path: Path, *parts: bytes, **options: Any) -> None:
+        contents.append(b"".join(parts))
+        write_atomically(path, *parts, **options)
+
+    monkeypatch.setattr("keras_pendulum.storage.checksum.write_atomically", write)
+    kp.train_dqn(config, tmp_path / "run")
+    assert (tmp_path / "run" / "pendulum_weight.h5").read_bytes() == contents[-1]
+    episodes = []
+    for content in contents:
+        (tmp_path / "one.h5").write_bytes(content)
+        episodes.append(len(load_checkpoint(tmp_path / "one.h5", config).history))
+    assert episodes == [0, 1, 11, 21, 24]
+
+
+def full_disk(descriptor: int) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def fill_disk_after(files: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    remaining = iter(range(files))
+    fsync = os.fsync
+    monkeypatch.setattr(
+        "keras_pendulum.storage.atomic_write.os.fsync",
+        lambda file: full_disk(file) if next(remaining, None) is None else fsync(file),
+    )
+
+
+def test_failed_checkpoint_ends_the_run_and_keeps_the_previous_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=40, hidden_units=(8,))
+    records: list[EpisodeRecord] = []
+    # Three checkpoints (before the run, episodes 0 and 10), the settings and the history.
+    fill_disk_after(5, monkeypatch)
+    with pytest.raises(kp.UserError, match=r"cannot write .*No space left"):
+        kp.train_dqn(config, tmp_path, listeners=[records.append])
+    assert records[-1].episode == 29  # the checkpoint of episode 30 raises the error of 20
+    monkeypatch.undo()
+    assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 11
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_failed_last_checkpoint_raises(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fill_disk_after(4, monkeypatch)
+    with pytest.raises(kp.UserError, match=r"cannot write .*pendulum_weight\.h5: No space left"):
+        kp.train_dqn(kp.preset("original", episodes=2, hidden_units=(8,)), tmp_path)
+
+
+def test_used_folder_is_overwritten_only_with_overwrite(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(kp.UserError, match=r"already holds a run.*--resume.*--overwrite"):
+        kp.train_dqn(config, tmp_path)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+    kp.train_dqn(kp.preset("original", episodes=3, hidden_units=(8,)), tmp_path, overwrite=True)
+    assert len((tmp_path / "history.csv").read_text().splitlines()) == 4
+
+
+def test_run_of_another_environment_is_removed_only_after_the_first_new_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pendulum = kp.preset("original", episodes=2, hidden_units=(8,))
+    cartpole = kp.preset("cartpole-original", episodes=2)
+    kp.train_dqn(pendulum, tmp_path)
+    with pytest.raises(kp.UserError, match=r"already holds a run .*pendulum_weight\.h5"):
+        kp.train_dqn(cartpole, tmp_path)
+    policy = (tmp_path / "pendulum_weight.h5").read_bytes()
+    with monkeypatch.context() as patched:
+        patched.setattr("keras_pendulum.storage.atomic_write.os.fsync", full_disk)
+        with pytest.raises(kp.UserError, match="cannot write"):
+            kp.train_dqn(cartpole, tmp_path, overwrite=True)
+    assert (tmp_path / "pendulum_weight.h5").read_bytes() == policy
+    kp.train_dqn(cartpole, tmp_path, overwrite=True)
+    assert not (tmp_path / "pendulum_weight.h5").exists()
+    assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
+
+
+def test_second_run_in_the_same_folder_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    # Saves without a thread, so that the folder does not change during the comparison.
+    monkeypatch.setattr(
+        CheckpointWriter, "save", lambda writer, run: save_checkpoint(run, writer.path)
+    )
+
+    def start_second_run(record: object) -> None:
+        before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+        for overwrite, resume in ((True, False), (False, True), (False, False)):
+            with pytest.raises(kp.UserError, match="another run is writing in"):
+                kp.train_dqn(config, tmp_path, overwrite=overwrite, resume=resume)
+        assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+    kp.train_dqn(config, tmp_path, listeners=[start_second_run])
+    kp.train_dqn(config, tmp_path, overwrite=True)
+
+
+def test_resumed_run_removes_temporary_files_of_a_killed_run(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    for name in ("pendulum_weight.h5", "cartpole_weight.h5", "history.csv", "rewards.png"):
+        (tmp_path / f".{name}.0123456789abcdef.tmp").touch()
+    (tmp_path / "mine.tmp").touch()
+    kp.train_dqn(config, tmp_path, resume=True)
+    assert [file.name for file in tmp_path.glob("*.tmp")] == ["mine.tmp"]
+
+
+def test_folder_with_two_checkpoints_needs_the_environment(tmp_path: Path) -> None:
+    pendulum = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(pendulum, tmp_path)
+    kp.train_dqn(kp.preset("cartpole-original", episodes=2), tmp_path / "other")
+    cartpole = (tmp_path / "other" / "cartpole_weight.h5").rename(tmp_path / "cartpole_weight.h5")
+    content = cartpole.read_bytes()
+    with pytest.raises(kp.UserError, match=r"holds pendulum_weight\.h5 and cartpole_weight\.h5"):
+        RunFolder(tmp_path)
+    kp.train_dqn(replace(pendulum, episodes=3), tmp_path, resume=True)
+    assert cartpole.read_bytes() == content
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_other_files_in_a_folder_called_tensorboard_are_not_removed(
+    overwrite: bool, tmp_path: Path
+) -> None:
+    (tmp_path / "tensorboard").mkdir()
+    (tmp_path / "tensorboard" / "my_best.h5").write_bytes(b"a policy")
+    if overwrite:
+        (tmp_path / "tensorboard" / "events.out.tfevents.1.host").touch()
+    config = kp.preset("original", episodes=1, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path, overwrite=overwrite)
+    assert len(list((tmp_path / "tensorboard").iterdir())) == 1
+    assert (tmp_path / "tensorboard" / "my_best.h5").read_bytes() == b"a policy"
+
+
+def test_folder_with_only_tensorboard_curves_is_used(tmp_path: Path) -> None:
+    (tmp_path / "tensorboard").mkdir()
+    (tmp_path / "tensorboard" / "events.out.tfevents.1.host").touch()
+    with pytest.raises(kp.UserError, match=r"already holds a run \(tensorboard\)"):
+        kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
+
+
+def test_link_changed_during_a_run_does_not_change_its_folder(tmp_path: Path) -> None:
+    best, new, latest = (tmp_path / name for name in ("best", "new", "latest"))
+    config = kp.preset("original", episodes=12, hidden_units=(8,))
+    kp.train_dqn(replace(config, seed=7), best)
+    before = {file: file.read_bytes() for file in best.iterdir()}
+    new.mkdir()
+    latest.symlink_to(new)
+
+    def change_link(record: EpisodeRecord) -> None:
+        if record.episode == 5:
+            latest.unlink()
+            latest.symlink_to(best)
+
+    kp.train_dqn(config, latest, listeners=[change_link])
+    assert {file: file.read_bytes() for file in best.iterdir()} == before
+    assert len(load_checkpoint(new / "pendulum_weight.h5", config).history) == 12
+
+
+@pytest.mark.parametrize("writing", ["a checkpoint", "its history"])
+def test_run_ends_when_its_folder_is_moved_and_does_not_write_in_the_new_one(
+    writing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, moved = tmp_path / "run", tmp_path / "moved"
+    config = kp.preset("original", episodes=12, hidden_units=(8,))
+    before: dict[Path, bytes] = {}
+    write_started, folder_moved = threading.Event(), threading.Event()
+    is_first = iter([True])
+
+    def write(path: Path, *parts: bytes, **options: Any) -> None:
+        if threading.current_thread() is not threading.main_thread() and next(is_first, False):
+            write_started.set()
+            assert writing != "a checkpoint" or folder_moved.wait(60)
+        write_atomically(path, *parts, **options)
+
+    def move(record: EpisodeRecord) -> None:
+        if record.episode == (0 if writing == "a checkpoint" else 5):
+            assert write_started.wait(60)
+            folder.rename(moved)
+            kp.train_dqn(replace(config, seed=7), folder)
+            before.update({file: file.read_bytes() for file in folder.iterdir()})
+            folder_moved.set()
+
+    monkeypatch.setattr("keras_pendulum.storage.checksum.write_atomically", write)
+    with pytest.raises(kp.UserError, match="run was moved, removed or replaced"):
+        kp.train_dqn(config, folder, listeners=[move])
+    assert len(before) == 4
+    assert {file: file.read_bytes() for file in folder.iterdir()} == before
+    assert load_checkpoint(moved / "pendulum_weight.h5", config).config == config
+
+
+def test_unreadable_folder_raises(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(kp.UserError, match=r"cannot read the folder a.*File name too long"):
+        RunFolder("a" * 300)
+
+    def refuse(*arguments: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("keras_pendulum.storage.folder_lock.os.open", refuse)
+    with pytest.raises(kp.UserError, match=r"cannot read the folder .*Permission denied"):
+        kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)), tmp_path)
+
+
+def test_on_checkpoint_can_save_weights_during_the_write(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=30, hidden_units=(8,), save_every=1)
+    kp.train_dqn(
+        config,
+        tmp_path,
+        on_checkpoint=lambda network, episode: kp.save_weights(network, tmp_path / f"{episode}.h5"),
+    )
+    assert len(list(tmp_path.glob("*[0-9].h5"))) == 30
+
+
+@pytest.mark.parametrize(
+    ("preset", "optimum", "random"),
+    [("original", -40.69, -909), ("swingup", -135.16, -370), ("cartpole", 500, 20.6)],
+)
+def test_picture_shows_the_optimal_and_the_random_return(
+    preset: str, optimum: float, random: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[float, float]] = []
+
+    def draw(history: Any, environment: str, returns: dict[str, float], planes: Any) -> bytes:
+        assert list(returns) == ["best possible", "random actions"]
+        drawn.append((returns["best possible"], returns["random actions"]))
+        return b"a picture"
+
+    monkeypatch.setattr("keras_pendulum.train.run_figure.draw_run", draw)
+    kp.train_dqn(kp.preset(preset, episodes=1, hidden_units=(8,)), tmp_path)
+    assert (tmp_path / "rewards.png").read_bytes() == b"a picture"
+    assert len(drawn) == 1
+    assert drawn[0][0] == pytest.approx(optimum, abs=0.05)
+    assert drawn[0][1] == pytest.approx(random, rel=0.1)
