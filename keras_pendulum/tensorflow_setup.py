@@ -54,7 +54,7 @@ def require_tensorflow() -> None:
 def fast_import() -> Iterator[None]:
     """Pauses garbage collection while TensorFlow and Keras are imported.
 
-    Their import creates so many permanent objects that collecting takes a third of its time
+    Their import creates so many permanent objects that collecting takes two fifths of its time
     (benchmarks/import_time.py).
     """
     imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
