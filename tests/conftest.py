@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -29,6 +30,10 @@ QUICK_ROOMS = ("dqn", "config", "environments", "storage")
 Recorded = dict[str, NDArray[Any]]
 Command = Callable[..., subprocess.CompletedProcess[str]]
 Refusal = Callable[[Callable[[list[str]], int], Sequence[object]], str]
+
+
+# A shell starts a background job with Ctrl-C ignored, and so would every command in the tests.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
