@@ -2,7 +2,7 @@
 
     python -m benchmarks.saving [RUNS]
 
-A run of `reference` waits while its state is copied, and is slower while a thread writes the file.
+A run of `reference` waits while its state is encoded, and is slower while a thread writes the file.
 Both are measured within the run, because whole runs differ by more: the wait, and the time of the
 episode after a checkpoint minus that of later episodes. The table gives medians over a run's
 checkpoints and over the runs. Each run is a process (5 runs, a minute and a half).

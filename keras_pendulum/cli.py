@@ -6,12 +6,14 @@ import argparse
 import contextlib
 import io
 import os
+import shlex
 import signal
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, one_line
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -19,7 +21,7 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Prints the error and exits with status 2."""
-        self.exit(2, f"error: {_one_line(message)}\n")
+        self.exit(2, f"error: {one_line(message)}\n")
 
     def parse_args(self, *words: Any) -> Any:  # type: ignore[override]
         """Parses the command line; prints completions and exits where a shell asks for them."""
@@ -60,14 +62,28 @@ class ControlC:
         self.check()
 
 
+def add_activation_flag(parser: argparse.ArgumentParser) -> None:
+    """Adds the flag for weights files that record no activation, such as those of Keras."""
+    parser.add_argument(
+        "--activation",
+        choices=("tanh", "relu", "linear"),
+        help="activation of the hidden layers [recorded in the file, else tanh]",
+    )
+
+
 def run_command(command: Callable[[], int]) -> int:
-    """Returns the exit status of `command`; a UserError is one line on stderr and status 2."""
+    """Returns the exit status of `command`; a UserError is one line on stderr and status 2.
+
+    A warning is one line on stderr too.
+    """
     try:
-        status = command()
+        with warnings.catch_warnings():
+            warnings.showwarning = _print_warning
+            status = command()
         sys.stdout.flush()
         return status
     except UserError as error:
-        print(f"error: {_one_line(str(error))}", file=sys.stderr)
+        print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
@@ -78,7 +94,7 @@ def run_command(command: Callable[[], int]) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if isinstance(error, BrokenPipeError):
             return 1
-        print(f"error: {_one_line(str(error))}", file=sys.stderr)
+        print(f"error: {one_line(str(error))}", file=sys.stderr)
         return 2
 
 
@@ -90,8 +106,8 @@ def _prepare_output() -> None:
         sys.stdout.reconfigure(errors="replace")
 
 
-def _one_line(message: str) -> str:
-    return " ".join(message.splitlines())
+def _print_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"warning: {one_line(str(message))}", file=sys.stderr)
 
 
 def nonempty_path(text: str) -> str:
@@ -99,3 +115,9 @@ def nonempty_path(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("the name is empty")
     return text
+
+
+def shell_word(path: str | os.PathLike[str]) -> str:
+    """Returns a path as a word of a shell command; no command takes the word for a flag."""
+    word = os.fspath(path)
+    return shlex.quote(f"./{word}" if word.startswith("-") else word)

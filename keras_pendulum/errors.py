@@ -1,8 +1,13 @@
 """Errors that a user can correct; each message is one line."""
 
+_LONGEST = 300  # characters of a message
+
 
 class UserError(Exception):
     """A mistake of the user. The message says what was found and what to do."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class ConfigError(UserError, ValueError):
@@ -11,3 +16,27 @@ class ConfigError(UserError, ValueError):
 
 class WeightsError(UserError, ValueError):
     """A weights file that cannot be read, or does not hold the expected network."""
+
+
+def require_type(name: str, value: object, expected: type | tuple[type, ...]) -> None:
+    """Raises TypeError when the argument `name` has another type than expected."""
+    if not isinstance(value, expected):
+        types = expected if isinstance(expected, tuple) else (expected,)
+        names = " or ".join(kind.__name__ for kind in types)
+        raise TypeError(one_line(f"{name} is {value!r}; expected {names}"))
+
+
+def one_line(message: str) -> str:
+    """Returns a message as one printable line of at most 300 characters.
+
+    The name of a file or an attribute may hold line breaks and terminal codes; they are escaped.
+    Of a long message, the middle is left out: its end says what to do.
+    """
+    line = "".join(
+        character if character.isprintable() else character.encode("unicode_escape").decode()
+        for character in message
+    )
+    if len(line) <= _LONGEST:
+        return line
+    half = _LONGEST // 2
+    return f"{line[: half - 1]}…{line[-half:]}"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import keras
 
+from keras_pendulum.dqn.policy import activations_of
+
+REGISTERED_NAME = "keras_pendulum>DQN"  # in the files of Keras
 _DTYPE = "float32"  # also where the user's keras.json names another one
 
 
@@ -23,10 +27,12 @@ class Provenance:
     config: str | None = None  # the settings of the run, as JSON
 
 
+@keras.saving.register_keras_serializable("keras_pendulum")
 class DQN(keras.Model):
     """Dense layers with an activation, then a linear output for each action.
 
-    The constructor builds the weights. They depend on `seed` alone: `glorot` is uniform within
+    `activation` is one name for all hidden layers, or one for each, separated by commas. The
+    constructor builds the weights. They depend on `seed` alone: `glorot` is uniform within
     ±√(6 / (inputs + outputs)) with biases 0, `fan-in` is uniform within ±1/√inputs, biases too.
     """
 
@@ -50,25 +56,18 @@ class DQN(keras.Model):
         seeds = keras.random.SeedGenerator(seed)
 
         def dense(name: str, inputs: int, units: int, activation: str | None) -> keras.layers.Dense:
-            kernel: Any = keras.initializers.GlorotUniform(seed=seeds)
-            bias: Any = "zeros"
-            if initial_weights == "fan-in":
-                limit = inputs**-0.5
-                kernel = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
-                bias = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
-            return keras.layers.Dense(
-                units,
-                activation,
-                kernel_initializer=kernel,
-                bias_initializer=bias,
-                name=name,
-                dtype=_DTYPE,
-            )
+            layer = partial(keras.layers.Dense, units, activation, name=name, dtype=_DTYPE)
+            if initial_weights == "glorot":
+                return layer(kernel_initializer=keras.initializers.GlorotUniform(seed=seeds))
+            limit = inputs**-0.5
+            uniform = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
+            return layer(kernel_initializer=uniform, bias_initializer=uniform)
 
         widths = (observation_size, *hidden_units)
+        names = activations_of(activation, len(self.hidden_units))
         self.hidden = [
-            dense(f"hidden_{i}", inputs, units, activation)
-            for i, (inputs, units) in enumerate(pairwise(widths))
+            dense(f"hidden_{i}", inputs, units, name)
+            for i, ((inputs, units), name) in enumerate(zip(pairwise(widths), names, strict=True))
         ]
         self.head = dense("head", widths[-1], action_count, None)
         self.build((None, observation_size))
@@ -90,12 +89,17 @@ class DQN(keras.Model):
 
     def clone(self) -> DQN:
         """Returns a network with the same weights and its own variables."""
-        copy = DQN(
-            self.hidden_units,
-            self.action_count,
-            observation_size=self.observation_size,
-            activation=self.activation,
-            provenance=self.provenance,
-        )
+        copy = DQN.from_config(self.get_config())
         copy.set_weights(self.get_weights())
         return copy
+
+    def get_config(self) -> dict[str, Any]:
+        """Returns the arguments for `from_config`; Keras copies and saves networks with both."""
+        names = ("hidden_units", "action_count", "observation_size", "activation")
+        return {name: getattr(self, name) for name in names} | asdict(self.provenance)
+
+    @classmethod
+    def from_config(cls, config: dict[str, Any]) -> DQN:
+        """Returns a network with new weights."""
+        provenance = {field.name: config.pop(field.name) for field in fields(Provenance)}
+        return cls(**config, provenance=Provenance(**provenance))

@@ -11,12 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+# Each function writes into `out`, which is also its input.
+ACTIVATIONS: dict[str, Callable[..., Any]] = {
+    "tanh": np.tanh,
+    "relu": lambda features, out: np.maximum(features, 0, out=out),
+    "linear": lambda features, out: None,
+}
 
-def _relu(features: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    np.maximum(features, 0, out=out)
 
-
-ACTIVATIONS: dict[str, Callable[..., Any]] = {"tanh": np.tanh, "relu": _relu}
+def activations_of(activation: str, layers: int) -> list[str]:
+    """Returns the activation of each hidden layer: one name for all, or one each and commas."""
+    names = activation.split(",")
+    return names * layers if len(names) == 1 else names
 
 
 class GreedyPolicy:
@@ -24,22 +30,22 @@ class GreedyPolicy:
 
     Args:
         weights: kernel [in, out] and bias [out] of each layer, as `get_weights` returns them.
-        activation: of the hidden layers, a key of ACTIVATIONS.
+        activation: of the hidden layers, see `activations_of`.
     """
 
     def __init__(self, weights: Sequence[NDArray[np.float32]], activation: str) -> None:
-        self._hidden = list(zip(weights[:-2:2], weights[1:-2:2], strict=True))
+        functions = map(ACTIVATIONS.__getitem__, activations_of(activation, len(weights) // 2 - 1))
+        self._hidden = list(zip(weights[:-2:2], weights[1:-2:2], functions, strict=True))
         self._head = weights[-2:]
-        self._activate = ACTIVATIONS[activation]
 
     def q_values(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
         """Returns the Q-values [A] of an observation [D], or [B, A] of [B, D]."""
         # `dot` and sums in place: for one observation the calls take as long as the arithmetic.
         features = observation
-        for kernel, bias in self._hidden:
+        for kernel, bias, activate in self._hidden:
             features = features.dot(kernel)
             features += bias
-            self._activate(features, out=features)
+            activate(features, out=features)
         kernel, bias = self._head
         q = features.dot(kernel)
         q += bias

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
 from keras_pendulum.display import draw_without_display, require_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
@@ -44,6 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
     )
+    add_activation_flag(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--render", action="store_true", help="show the episodes in a window")
     parser.add_argument(
@@ -69,7 +70,7 @@ def _evaluate(arguments: argparse.Namespace) -> int:
             raise UserError("the window was closed before the end of the last episode")
 
     path = find_weights(arguments.weights)
-    network = load_weights(path)
+    network = load_weights(path, arguments.activation)
     score = evaluate_policy(
         network,
         arguments.episodes,

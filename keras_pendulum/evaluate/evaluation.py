@@ -18,9 +18,10 @@ from keras_pendulum.dqn.network import DQN, Provenance
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import make_actions
 from keras_pendulum.environments.tasks import TASKS, make_environment, pendulum_starts
-from keras_pendulum.errors import ConfigError
+from keras_pendulum.errors import ConfigError, require_type
 from keras_pendulum.optimum.dynamics import TORQUES, simulate_return
 from keras_pendulum.optimum.optimal_return import USUAL_SEEDS, optimal_return
+from keras_pendulum.storage.weights import require_finite
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,11 @@ def evaluate_policy(
         render_mode: Gymnasium's.
         on_step: called with the environment after each reset and each step.
 
-    Raises ConfigError for a number out of range, and for a gravity with CartPole.
+    Raises ConfigError for a number out of range, and for a gravity with CartPole. Raises UserError
+    when a weight is not finite, and TypeError when `network` is no DQN.
     """
+    require_type("network", network, DQN)
+    require_finite(network.get_weights())
     episodes = validate_setting("episodes", episodes)
     seed = validate_setting("seed", seed)
     validate_setting("seed", seed + episodes - 1)

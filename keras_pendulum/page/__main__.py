@@ -10,7 +10,7 @@ import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
-from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
@@ -37,6 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
     )
+    add_activation_flag(parser)
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
     arguments = parser.parse_args(argv)
     return run_command(lambda: _write(arguments))
@@ -54,7 +55,7 @@ def _write(arguments: argparse.Namespace) -> int:
         from keras_pendulum.storage.weights import find_weights, load_weights
 
     path = find_weights(arguments.weights)
-    page = build_page(load_weights(path), path, arguments.gravity)
+    page = build_page(load_weights(path, arguments.activation), path, arguments.gravity)
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import json
-import math
 import re
 from importlib import resources
 from pathlib import Path
@@ -17,7 +16,7 @@ from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.evaluate.evaluation import evaluation_gravity
-from keras_pendulum.storage import keras_h5
+from keras_pendulum.storage.weights import recorded_return
 
 _WEB = resources.files("keras_pendulum.page") / "web"
 
@@ -41,7 +40,7 @@ def build_page(network: DQN, path: Path, gravity: float | None = None) -> bytes:
         "preset": None if provenance.preset is None else str(provenance.preset),
         "gravity": evaluation_gravity(provenance, gravity),
         "trainedGravity": provenance.gravity,
-        "evaluatedReturn": _evaluated_return(path),
+        "evaluatedReturn": recorded_return(path),
         "sizes": [network.observation_size, *network.hidden_units, network.action_count],
         "activation": network.activation,
         "weights": base64.b64encode(weights).decode(),
@@ -63,11 +62,3 @@ def _fill(content: dict[str, Any]) -> str:
     # The name of a file may contain any text, even the end tag of a script.
     data = json.dumps(content, allow_nan=False).replace("<", r"\u003c")
     return page.replace('id="network">null<', f'id="network">{data}<')
-
-
-def _evaluated_return(path: Path) -> float | None:
-    """Returns the mean return that the file records, or None."""
-    with keras_h5.open_h5(path) as file:
-        group = file.get("keras_pendulum")
-        value = None if group is None else group.attrs.get("evaluated_return")
-        return float(value) if value is not None and math.isfinite(value) else None

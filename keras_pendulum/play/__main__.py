@@ -10,7 +10,13 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from keras_pendulum.cli import ControlC, OneLineParser, nonempty_path, run_command
+from keras_pendulum.cli import (
+    ControlC,
+    OneLineParser,
+    add_activation_flag,
+    nonempty_path,
+    run_command,
+)
 from keras_pendulum.config.config import Config, validate_setting
 from keras_pendulum.display import require_display
 from keras_pendulum.environments.tasks import TASKS
@@ -41,6 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar="WEIGHTS.h5",
         help="a file, or the name of a shipped one: its policy drives after you",
     )
+    add_activation_flag(parser)
     parser.add_argument(
         "--print-steps", action="store_true", help="print a line for each of your steps"
     )
@@ -57,13 +64,15 @@ def _play(arguments: argparse.Namespace) -> int:
     require_display()
     agent = None
     if arguments.against is not None:
-        agent, gravity = _load_agent(arguments.against, gravity)
+        agent, gravity = _load_agent(arguments.against, gravity, arguments.activation)
     elif gravity is None:
         gravity = Config.gravity
     return _run_game(gravity, seed, agent, arguments.print_steps)
 
 
-def _load_agent(weights: str, gravity: float | None) -> tuple[Policy, float]:
+def _load_agent(
+    weights: str, gravity: float | None, activation: str | None
+) -> tuple[Policy, float]:
     """Returns the greedy policy of a weights file, and the gravity to play at (m/s²)."""
     require_tensorflow()
     with fast_import():
@@ -74,7 +83,7 @@ def _load_agent(weights: str, gravity: float | None) -> tuple[Policy, float]:
     from keras_pendulum.environments.actions import TorqueGrid
 
     path = find_weights(weights)
-    network = load_weights(path)
+    network = load_weights(path, activation)
     provenance = network.provenance
     if not TASKS[provenance.environment].has_torque:
         raise UserError(f"{path}: belongs to {provenance.environment}; expected Pendulum-v1")

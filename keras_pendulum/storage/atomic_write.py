@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import sys
 import uuid
 from collections.abc import Callable
 from pathlib import Path
@@ -15,18 +17,22 @@ def write_atomically(
 ) -> None:
     """Writes a temporary file, flushes it to the disk, and replaces the file at `path` with it.
 
+    Then it flushes the folder, so that the new file is there after a power failure.
+
     Args:
         path: the file.
         parts: the content, in order.
         check: called with the temporary file; if it raises, the old file is unchanged.
 
-    Raises UserError when the file system refuses. The file at `path` is then unchanged.
+    Raises UserError when the file system refuses, or when something else than a file is at `path`,
+    such as a folder, a pipe or a device. What is at `path` is then unchanged.
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex}.tmp")
     try:
-        if target.is_dir():
-            raise IsADirectoryError(None, "it is a folder")
+        if Path(path).exists() and not target.is_file():
+            kind = "a folder" if target.is_dir() else "a device, a pipe or a socket"
+            raise OSError(None, f"it is {kind}; name a file")
         try:
             with open(temporary, "xb") as file:
                 file.writelines(parts)
@@ -38,6 +44,18 @@ def write_atomically(
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise UserError(f"cannot write {path}: {error.strerror or error}") from error
+    with contextlib.suppress(OSError):  # the new file is in place, and not every system can do it
+        _flush_folder(target.parent)
+
+
+def _flush_folder(folder: Path) -> None:
+    if sys.platform == "win32":  # it cannot open a folder
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def require_no_other_file(path: Path, beginning: bytes, kind: str) -> None:

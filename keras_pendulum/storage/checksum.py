@@ -29,7 +29,7 @@ def write_with_checksum(
     write_atomically(path, content, _LABEL + digest.encode(), check=check)
 
 
-def verify(file: BinaryIO, path: str | os.PathLike[str]) -> None:
+def verify(file: BinaryIO) -> None:
     """Raises WeightsError when a file does not match its checksum.
 
     Accepts a file that ends with its HDF5 content: Keras writes no checksum.
@@ -49,8 +49,8 @@ def verify(file: BinaryIO, path: str | os.PathLike[str]) -> None:
         content_size -= len(part)
     if found != _LABEL + sha256.hexdigest().encode():
         raise WeightsError(
-            f"{path}: the file is damaged, or another program changed it (its SHA-256 differs from "
-            "the recorded one)"
+            "the file is damaged, or another program changed it (its SHA-256 differs from the "
+            "recorded one)"
         )
 
 

@@ -6,31 +6,29 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
+import warnings
 from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.config import validate_setting
-from keras_pendulum.dqn.network import DQN, Provenance
-from keras_pendulum.dqn.policy import ACTIVATIONS
+from keras_pendulum.dqn.network import DQN, REGISTERED_NAME, Provenance
+from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import ConfigError, UserError, WeightsError
-from keras_pendulum.storage import keras_h5
+from keras_pendulum.errors import ConfigError, UserError, WeightsError, require_type
 from keras_pendulum.storage.checksum import write_with_checksum
-from keras_pendulum.storage.hdf5_writer import (
-    add_arrays,
-    add_attributes,
-    add_group,
-    file_bytes,
-    file_in_memory,
-)
+from keras_pendulum.storage.keras_h5 import Layer, read_layers, write_layers
+from keras_pendulum.storage.model_config import read_model
+from keras_pendulum.storage.quarantine import H5File, open_h5
 from keras_pendulum.version import __version__
 
 _GROUP = "keras_pendulum"  # a group beside the layers, which Keras ignores
@@ -52,11 +50,13 @@ def save_weights(
 
     Raises UserError when the file cannot be written, or when `load_weights` would reject it.
     """
+    require_type("network", network, DQN)
+    require_type("path", path, (str, os.PathLike))
     content = encode_weights(network, network.get_weights(), evaluated_return=evaluated_return)
 
     def read_back(file: Path) -> None:
         try:
-            _read(file)
+            _read(str(file))
         except WeightsError as error:
             reason = str(error).removeprefix(f"{file}: ")
             raise UserError(f"cannot write {path}: it could not be loaded, {reason}") from error
@@ -90,56 +90,106 @@ def encode_weights(
         **{name: getattr(network.provenance, name) for name in _OPTIONAL},
         "evaluated_return": evaluated_return,
     }
-    attributes = {
-        name: value.encode() if isinstance(value, str) else value
-        for name, value in values.items()
-        if value is not None
-    }
-    with file_in_memory() as file:
-        keras_h5.write_layers(file, weights)
-        add_attributes(add_group(file, _GROUP), attributes)
+    # A unique name, because HDF5 does not open two files of one name, not even in memory.
+    name = f"{uuid4().hex}.h5"
+    with h5py.File(name, "w", driver="core", backing_store=False, block_size=2**23) as file:
+        write_layers(file, weights)
+        attributes = file.create_group(_GROUP).attrs
+        for name, value in values.items():
+            if value is not None:
+                # Strings of fixed length, because HDF5 stores others in a heap.
+                attributes[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
         for name, arrays in groups.items():
-            add_arrays(add_group(file, name), arrays)
-        return file_bytes(file)
+            group = file.create_group(name)
+            for key, array in arrays.items():
+                group.create_dataset(key, data=array, track_times=False)  # the same bytes each time
+        file.flush()
+        content: bytes = file.id.get_file_image()
+    return content
 
 
 def require_finite(arrays: Iterable[NDArray[Any]]) -> None:
     """Raises UserError when a number is NaN or infinite, which `load_weights` rejects."""
     if not all(np.isfinite(array).all() for array in arrays):
         raise UserError(
-            "a weight is not finite, learning has diverged; nothing is saved: try a smaller "
-            "learning_rate"
+            "a weight is not finite, learning has diverged; such a network is neither saved nor "
+            "evaluated: try a smaller learning_rate"
         )
 
 
-def load_weights(path: str | os.PathLike[str]) -> DQN:
-    """Returns the network in a `.h5` of this package, of Keras 2, or of Keras 3 (`.weights.h5`).
+def load_weights(path: str | os.PathLike[str], activation: str | None = None) -> DQN:
+    """Returns the network in a file of this package, of Keras 2 or of Keras 3.
 
-    The file determines layer sizes and action count. Without a recorded activation, the hidden
-    layers use tanh.
+    The file is a `.h5`, a `.weights.h5` or a `.keras`. It determines layer sizes and action count,
+    and in a whole model the activations.
 
-    Raises WeightsError when the file is missing or damaged, or does not hold such a network.
+    Args:
+        path: the file.
+        activation: tanh, relu or linear, of the hidden layers, for a file that holds weights alone.
+            Without it, and without a recorded one, they are tanh, with a warning.
+
+    Raises WeightsError when the file is missing or damaged, does not hold such a network, or
+    records another activation.
     """
-    activation, provenance, layers = _read(path)
-    widths = [bias.shape[0] for bias in layers[1::2]]
+    require_type("path", path, (str, os.PathLike))
+    if activation is not None and activation not in ACTIVATIONS:
+        raise ConfigError(f"activation is {activation}, expected {', '.join(ACTIVATIONS)}")
+    name = os.fsdecode(path)
+    recorded, provenance, layers = _read(name)
+    if recorded is None:
+        if activation is None:
+            warnings.warn(
+                f"{name} records no activation: its hidden layers get tanh; name another with "
+                "activation= (--activation)",
+                stacklevel=2,
+            )
+    elif activation not in (None, recorded):
+        raise WeightsError(
+            f"{name}: records the activation {recorded}, not {activation}, for "
+            f"{provenance.environment}"
+        )
+    widths = [layer.bias.shape[0] for layer in layers]
     network = DQN(
         widths[:-1],
         widths[-1],
         observation_size=TASKS[provenance.environment].observation_size,
-        activation=activation,
+        activation=recorded or activation or "tanh",
         provenance=provenance,
     )
-    network.set_weights(layers)
+    network.set_weights([array for layer in layers for array in (layer.kernel, layer.bias)])
     return network
 
 
-def _read(path: str | os.PathLike[str]) -> tuple[str, Provenance, list[NDArray[np.float32]]]:
-    """Returns the activation, the provenance and the checked weights of a file's network."""
-    with keras_h5.open_h5(path) as file:
-        activation, provenance = _read_attributes(file, path)
+def recorded_return(path: str | os.PathLike[str]) -> float | None:
+    """Returns the mean return that a weights file records, or None."""
+    with open_h5(path) as file:
+        value = file.attributes.get(_GROUP, {}).get("evaluated_return")
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+
+
+def _read(path: str) -> tuple[str | None, Provenance, list[Layer]]:
+    """Returns the recorded activation, the provenance and the checked layers of a network."""
+    with open_h5(path) as file:
+        root = file.attributes[""]
+        model = read_model(root["model_config"], path) if "model_config" in root else None
+        attributes = file.attributes.get(_GROUP, {})
+        if model and model.get("registered_name") == REGISTERED_NAME:
+            config = model["config"]
+            attributes = {name: config[name] for name in config if config[name] is not None}
+        provenance = _provenance(attributes, path)
         task = TASKS[provenance.environment]
-        layers = keras_h5.read_layers(file, path, task.observation_size)
-    outputs = layers[-1].shape[0]
+        layers = read_layers(file, path, task.observation_size, model)
+    activation = attributes.get("activation")
+    if layers[-1].activation is not None:  # a whole model records one for each layer
+        names = [str(layer.activation) for layer in layers[:-1]]
+        activation = ",".join(names if len(set(names)) > 1 else names[:1]) or "tanh"
+    if activation is not None:
+        names = activations_of(str(activation), len(layers) - 1)
+        if len(names) != len(layers) - 1 or set(names) - ACTIVATIONS.keys():
+            raise WeightsError(
+                f"{path}: records the activation {activation!r}; expected {', '.join(ACTIVATIONS)}"
+            )
+    outputs = layers[-1].bias.shape[0]
     if outputs < 2:
         raise WeightsError(f"{path}: the network has one output; expected one for each action")
     if task.action_count not in (None, outputs):
@@ -150,16 +200,10 @@ def _read(path: str | os.PathLike[str]) -> tuple[str, Provenance, list[NDArray[n
     return activation, provenance, layers
 
 
-def _read_attributes(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str, Provenance]:
-    attributes = {
-        name: keras_h5.decode(value) if isinstance(value, bytes | str) else value
-        for name, value in (file[_GROUP].attrs.items() if _GROUP in file else ())
-    }
-    activation = attributes.get("activation", "tanh")
-    if activation not in ACTIVATIONS:
-        raise WeightsError(
-            f"{path}: records the activation {activation!r}; expected {' or '.join(ACTIVATIONS)}"
-        )
+def _provenance(attributes: dict[str, Any], path: str) -> Provenance:
+    for name, value in attributes.items():
+        if value is None:
+            raise WeightsError(f"{path}: the attribute {name} is neither text nor a number")
     environment = attributes.get("environment", "Pendulum-v1")
     if environment not in TASKS:
         raise WeightsError(
@@ -171,13 +215,24 @@ def _read_attributes(file: h5py.File, path: str | os.PathLike[str]) -> tuple[str
             gravity = validate_setting("gravity", gravity)
         except ConfigError as error:
             raise WeightsError(f"{path}: the recorded {error}") from error
-    return activation, Provenance(
+    return Provenance(
         environment=environment,
         gravity=gravity,
         preset=attributes.get("preset"),
         seed=int(attributes["seed"]) if "seed" in attributes else None,
         config=attributes.get("config"),
     )
+
+
+def changed_versions(file: H5File) -> list[str]:
+    """Returns what differs between the recorded and the present versions, such as `keras 3.14.0`.
+
+    Each entry is a recorded version.
+    """
+    attributes = file.attributes[_GROUP]
+    recorded = {"keras_pendulum": attributes["version"], **json.loads(attributes["versions"])}
+    present = {"keras_pendulum": __version__, **_versions()}
+    return [f"{name} {recorded[name]}" for name in recorded if recorded[name] != present.get(name)]
 
 
 def _versions() -> dict[str, str]:

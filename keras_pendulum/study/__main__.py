@@ -92,11 +92,14 @@ def _study(arguments: argparse.Namespace) -> int:
     total = folder.job_count
     failures: list[FinishedJob] = []
     try:
-        missing = folder.missing_jobs()
+        missing = folder.missing_jobs(_print_problem)
         if finished := total - len(missing):
             print(f"{finished} of {total} runs are already finished", flush=True)
         if missing:
             failures = _make_runs(folder, missing, arguments)
+        else:
+            with folder.create_and_lock():  # writes `study.json` again if it was lost
+                pass
     except KeyboardInterrupt:
         _print_problem(
             f"Interrupted: {total - len(folder.missing_jobs())} of {total} runs are in "

@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 import warnings
+from asyncio import CancelledError
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import resource_tracker
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.errors import UserError
 from keras_pendulum.study.job import require_versions
-from keras_pendulum.study.runner import ATTEMPTS
+from keras_pendulum.study.runner import ATTEMPTS, lost_scheduler
 from keras_pendulum.tensorflow_setup import use_one_thread
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def cluster_workers(address: str, versions: dict[str, str]) -> Iterator[Client]:
 
     Raises UserError when it cannot be reached, when it has no worker within a minute, when it or a
     worker has other versions than `versions`, or when a worker has several threads: its runs would
-    share one TensorFlow.
+    share one TensorFlow. Raises UserError too when the scheduler is lost in the `with` block.
     """
     from distributed import Client
 
@@ -88,6 +89,7 @@ def cluster_workers(address: str, versions: dict[str, str]) -> Iterator[Client]:
         except (OSError, ValueError, TypeError) as error:
             raise unreachable from error
         stack.callback(_close, client)
+        stack.enter_context(_report_lost_scheduler(client, address))
         try:
             client.wait_for_workers(1, timeout=_FIRST_WORKER_SECONDS)
         except TimeoutError as error:
@@ -107,6 +109,21 @@ def dashboard(client: Client) -> str | None:
         return "distributed.dashboard.scheduler" in sys.modules
 
     return client.dashboard_link if client.run_on_scheduler(has_dashboard) else None
+
+
+@contextmanager
+def _report_lost_scheduler(client: Client, address: str) -> Iterator[None]:
+    """Raises UserError for an error of Dask in the `with` block, if the scheduler is lost."""
+    from distributed.comm.core import CommClosedError
+
+    try:
+        yield
+    except UserError:
+        raise
+    except (Exception, CancelledError) as error:
+        if client.status == "running" and not isinstance(error, CommClosedError):
+            raise
+        raise lost_scheduler(address) from error
 
 
 def _require_one_thread(client: Client) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import platform
 import time
@@ -12,7 +13,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 from keras_pendulum.config.config import Config
+from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
+from keras_pendulum.optimum.return_cache import LOWEST_REWARD
 from keras_pendulum.tensorflow_setup import fast_import, use_one_thread
 from keras_pendulum.version import __version__
 
@@ -122,7 +125,10 @@ def encode(job: Job, result: RunResult) -> bytes:
 
 
 def decode(data: bytes, job: Job) -> RunResult | None:
-    """Returns the result that `encode` wrote for this job; None for damaged or other bytes."""
+    """Returns the result that `encode` wrote for this job.
+
+    Returns None for damaged or other bytes, and for numbers that no run can have.
+    """
     try:
         content = json.loads(data)["result"]
         settings = _settings(job)
@@ -130,9 +136,31 @@ def decode(data: bytes, job: Job) -> RunResult | None:
             return None
         if {key: content[key] for key in settings} != settings:
             return None
-        return RunResult(*(content[field] for field in RunResult._fields))
+        result = RunResult(*(content[field] for field in RunResult._fields))
+        valid = _is_possible(result, job.config) and content["regret"] == result.regret
+        return result if valid else None
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
+
+
+def _is_possible(result: RunResult, config: Config) -> bool:
+    """Returns whether a run can have these numbers: how many there are, and their ranges."""
+    task = TASKS[config.environment]
+    low, high = (LOWEST_REWARD, 0.0) if task.has_torque else (0.0, 1.0)  # of a step's reward
+    points = math.ceil(config.episodes / EPISODES_PER_POINT)
+
+    def are_possible(numbers: list[float], count: int, steps: int) -> bool:
+        return len(numbers) == count and all(
+            isinstance(number, float) and steps * low <= number <= steps * high
+            for number in numbers
+        )
+
+    return (
+        are_possible([result.optimal_mean_return], 1, task.steps_per_episode)
+        and are_possible(result.returns, _EVALUATION_EPISODES, task.steps_per_episode)
+        and are_possible(result.average_rewards, points, 1)
+        and are_possible(result.episode_returns, points, config.max_episode_steps)
+    )
 
 
 def _settings(job: Job) -> dict[str, Any]:

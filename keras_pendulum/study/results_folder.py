@@ -6,7 +6,8 @@ import csv
 import io
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -57,7 +58,10 @@ class ResultsFolder:
         self.job_count = len(self._first_arms) * seeds
 
     def require_usable(self) -> None:
-        """Raises UserError when the folder holds another study or something else."""
+        """Raises UserError when the folder holds another study or something else.
+
+        Without its `study.json`, a folder is usable when all its results belong to this study.
+        """
         try:
             names = [file.name for file in self._folder.iterdir()]
         except FileNotFoundError:
@@ -66,6 +70,8 @@ class ResultsFolder:
             raise UserError(f"cannot read the folder {self.path}: {error.strerror}") from error
         if self._manifest.name in names:
             self._require_same_study()
+        elif results := sorted(self._results.glob("*/*.json")):
+            self._require_own_results(results)
         elif any(not name.startswith(f".{self._manifest.name}.") for name in names):
             raise UserError(
                 f"{self.path} holds something other than a study: name another folder with --out"
@@ -97,14 +103,20 @@ class ResultsFolder:
     def jobs(self) -> list[Job]:
         """Returns every run of the study, seed by seed, so that all arms get results equally."""
         return [
-            Job(arm.name, arm.slug, replace(arm.config, seed=seed), self.versions)
-            for seed in range(self._seeds)
-            for arm in self._first_arms.values()
+            self._job(arm, seed) for seed in range(self._seeds) for arm in self._first_arms.values()
         ]
 
-    def missing_jobs(self) -> list[Job]:
-        """Returns the jobs without a valid result."""
-        return [job for job in self.jobs() if self._read(job) is None]
+    def missing_jobs(self, report: Callable[[str], None] = lambda line: None) -> list[Job]:
+        """Returns the jobs without a valid result.
+
+        Args:
+            report: called with a line for each file that holds no valid result.
+        """
+        missing = [job for job in self.jobs() if self._read(job) is None]
+        for file in map(self._file, missing):
+            if file.exists():
+                report(f"{file} is damaged or was changed: its run is made again")
+        return missing
 
     def save(self, job: Job, reply: Reply) -> RunResult:
         """Writes a result atomically, and its cost to the log; returns the result.
@@ -143,6 +155,9 @@ class ResultsFolder:
                 found[config].append(result)
         return {arm.name: found[arm.training_config] for arm in self._arms}
 
+    def _job(self, arm: Arm, seed: int) -> Job:
+        return Job(arm.name, arm.slug, replace(arm.config, seed=seed), self.versions)
+
     def _file(self, job: Job) -> Path:
         return self._results / job.slug / f"{job.slug}-seed{job.config.seed}.json"
 
@@ -172,13 +187,30 @@ class ResultsFolder:
             raise UserError(f"cannot read {self._manifest}: {error.strerror}") from error
         except ValueError as error:
             raise UserError(
-                f"{self._manifest} is damaged: name another folder with --out"
+                f"{self._manifest} is damaged: remove it and run the same command again, which "
+                "uses the results found; or name another folder with --out"
             ) from error
         if not isinstance(manifest, dict) or not isinstance(manifest.get("versions"), dict):
             raise other_study
         require_versions(manifest["versions"], self.versions, f"{self.path}: this machine")
         if manifest.get("arms") != json.loads(_encode_json(self._description()))["arms"]:
             raise other_study
+
+    def _require_own_results(self, files: Iterable[Path]) -> None:
+        jobs = (
+            self._job(arm, int(name[1]))
+            for file in files
+            for arm in self._first_arms.values()
+            if (name := re.fullmatch(rf"{re.escape(arm.slug)}-seed(\d{{1,6}})", file.stem))
+        )
+        own = {self._file(job) for job in jobs if self._read(job) is not None}
+        for file in files:
+            if file not in own:
+                raise UserError(
+                    f"{file} is no result of this study, and study.json is missing: run the "
+                    "command that made the results, with its presets and arms, or name another "
+                    "folder with --out"
+                )
 
 
 def _encode_json(content: Any) -> bytes:

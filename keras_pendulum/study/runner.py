@@ -7,7 +7,7 @@ from itertools import islice
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, one_line
 from keras_pendulum.study.job import Job, Reply
 
 if TYPE_CHECKING:
@@ -77,10 +77,7 @@ def run_all(
         future, job, attempt = running.pop(event.key)
         reply, problem, repeatable = _outcome(future)
         if reply is None and client.status != "running":
-            raise UserError(
-                f"the scheduler at {address} is gone: start one and run the command again; it "
-                "continues with the remaining runs"
-            )
+            raise lost_scheduler(address)
         if repeatable and attempt < ATTEMPTS:
             report(f"{job}: repeated after {problem}")
             start(job, attempt + 1)
@@ -100,4 +97,12 @@ def _outcome(future: Future[Reply]) -> tuple[Reply | None, str, bool]:
     except KilledWorker as error:
         return None, f"it lost its worker {error.allowed_failures + 1} times", False
     except Exception as error:
-        return None, f"{type(error).__name__}: {' '.join(str(error).split())}", True
+        return None, one_line(f"{type(error).__name__}: {' '.join(str(error).split())}"), True
+
+
+def lost_scheduler(address: str) -> UserError:
+    """Returns the error to raise when the connection to the scheduler is lost."""
+    return UserError(
+        f"the scheduler at {address} is gone: start one and run the command again; it continues "
+        "with the remaining runs"
+    )

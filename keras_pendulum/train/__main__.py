@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 import signal
 import sys
 import time
@@ -13,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.cli import OneLineParser, nonempty_path, run_command, shell_word
 from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.display import require_display
@@ -81,7 +80,9 @@ def _train(arguments: argparse.Namespace) -> int:
         if arguments.preset:
             settings["preset"] = arguments.preset
         config = replace(load_config(RunFolder(out).weights), **settings)
-    init = load_weights(find_weights(arguments.init)) if arguments.init else None
+    init = None
+    if arguments.init:
+        init = load_weights(find_weights(arguments.init), config.activation)
 
     folder = RunFolder(out, config.environment)
     log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
@@ -159,9 +160,9 @@ def _print_summary(
 
 
 def _next_commands(result: TrainingResult, folder: RunFolder) -> str:
-    weights = shlex.quote(str(folder.path / folder.weights.name))
+    weights = shell_word(folder.path / folder.weights.name)
     if not result.finished:
-        commands = {"Continue": f"train --resume --out {shlex.quote(str(folder.path))}"}
+        commands = {"Continue": f"train --resume --out {shell_word(folder.path)}"}
     elif TASKS[result.network.provenance.environment].has_torque:
         commands = {
             "Watch it": f"evaluate {weights} --episodes 3 --render",

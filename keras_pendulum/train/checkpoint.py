@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import fields
-from typing import Any, NamedTuple
+from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.config import RENAMED, Config
 from keras_pendulum.dqn.agent import Variables
-from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import ConfigError, WeightsError
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.storage import keras_h5
 from keras_pendulum.storage.checksum import write_with_checksum
-from keras_pendulum.storage.weights import encode_weights, require_finite
+from keras_pendulum.storage.keras_h5 import read_layers
+from keras_pendulum.storage.quarantine import H5File, open_h5, report_damage
+from keras_pendulum.storage.weights import changed_versions, encode_weights, require_finite
 from keras_pendulum.train.run import Run, make_run
 
 # A resumed run may change these settings; any other change makes another run.
@@ -34,14 +34,13 @@ def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
     Raises UserError when the file cannot be written, or when a weight or an optimizer variable is
     not finite. The old checkpoint is then unchanged.
     """
-    _write(path, _copy_state(run))
+    write_with_checksum(path, _encode(run))
 
 
 class CheckpointWriter:
-    """A writer of checkpoints that writes in a thread while the run continues.
+    """A writer of checkpoints whose disk is written by a thread while the run continues.
 
-    `save` copies the state of the run, and the thread writes the file. The end of the `with` block
-    waits for the last file.
+    The end of the `with` block waits for the last file.
 
     Args:
         path: the file.
@@ -59,14 +58,17 @@ class CheckpointWriter:
         self._last: Future[None] | None = None
 
     def save(self, run: Run) -> None:
-        """Copies the state of the run and starts to write it, after the previous checkpoint.
+        """Starts to write the present state of the run, after the previous checkpoint.
 
-        An error of the thread is raised by the next call or at the end of the `with` block; see
-        `save_checkpoint`.
+        Raises UserError as `save_checkpoint` does. An error of the thread is raised by the next
+        call, or at the end of the `with` block.
         """
-        state = _copy_state(run)
+        # The thread does not encode: it would take Python's lock from the run, for twice as long.
+        content = _encode(run)
         self._wait()
-        self._last = self._thread.submit(_write, self.path, state, self._require_not_moved)
+        self._last = self._thread.submit(
+            write_with_checksum, self.path, content, check=lambda file: self._require_not_moved()
+        )
 
     def _wait(self) -> None:
         if self._last is not None:
@@ -81,54 +83,29 @@ class CheckpointWriter:
             self._wait()
 
 
-class _RunState(NamedTuple):
-    """A copy of a run's state."""
-
-    network: DQN  # for its layers and provenance; its weights may change meanwhile
-    weights: list[NDArray[np.float32]]  # of the online network
-    agent: dict[str, Variables]
-    replay: dict[str, NDArray[Any]]
-    json_state: dict[str, Any]  # settings, random-number generators and a counter
-    history: list[EpisodeRecord]
-
-
-def _copy_state(run: Run) -> _RunState:
+def _encode(run: Run) -> bytes:
+    """Returns the content of the run's checkpoint."""
+    online, agent = run.agent.online, run.agent.get_state()
+    for variables in agent.values():
+        require_finite(variables.values())
     json_state = {
         "config": vars(run.config),
         "random": run.streams.get_state(),
         "environment": run.env.unwrapped.np_random.bit_generator.state,
         "replay_added": run.replay.added,
     }
-    return _RunState(
-        run.agent.online,
-        run.agent.online.get_weights(),
-        run.agent.get_state(),
-        run.replay.get_state(),
-        json_state,
-        list(run.history),
-    )
-
-
-def _write(
-    path: str | os.PathLike[str],
-    state: _RunState,
-    require_not_moved: Callable[[], None] = lambda: None,
-) -> None:
-    for variables in state.agent.values():
-        require_finite(variables.values())
-    content = encode_weights(
-        state.network,
-        state.weights,
-        target=_dataset_names(state.agent["target"]),
-        optimizer=_dataset_names(state.agent["optimizer"]),
-        replay=state.replay,
+    return encode_weights(
+        online,
+        online.get_weights(),
+        target=_dataset_names(agent["target"]),
+        optimizer=_dataset_names(agent["optimizer"]),
+        replay=run.replay.get_state(),
         run={
             # JSON as an array, because an attribute can hold no more than 64 KB.
-            "state": np.frombuffer(json.dumps(state.json_state).encode(), np.uint8),
-            "history": np.array(state.history, np.float64),
+            "state": np.frombuffer(json.dumps(json_state).encode(), np.uint8),
+            "history": np.array(run.history, np.float64),
         },
     )
-    write_with_checksum(path, content, check=lambda file: require_not_moved())
 
 
 def _dataset_names(variables: Variables) -> Variables:
@@ -138,7 +115,7 @@ def _dataset_names(variables: Variables) -> Variables:
 
 def load_config(path: str | os.PathLike[str]) -> Config:
     """Returns the settings of the run in a checkpoint. Raises as `load_checkpoint` does."""
-    with keras_h5.open_h5(path) as file:
+    with open_h5(path) as file:
         return _config(_read_json_state(file, path), path)
 
 
@@ -154,7 +131,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
         WeightsError: the file is damaged, or holds weights without a run.
         ConfigError: `config` belongs to another run.
     """
-    with keras_h5.open_h5(path) as file:
+    with open_h5(path) as file:
         state = _read_json_state(file, path)
         stored = _config(state, path)
         for spec in fields(Config):
@@ -164,21 +141,32 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
                     f"{path}: this run has {spec.name} {old}, not {new}: resume it without this "
                     "change, or start another run in another folder"
                 )
-        rows = keras_h5.read_array(file["run/history"], path, finite=False)
+        rows = file.read("run/history", finite=False)
         if len(rows) > config.episodes:
             raise ConfigError(
                 f"{path}: this run has {len(rows)} episodes already; episodes is "
                 f"{config.episodes}, expected at least {len(rows)}"
             )
-        weights = keras_h5.read_layers(file, path, TASKS[stored.environment].observation_size)
+        size = TASKS[stored.environment].observation_size
+        layers = read_layers(file, os.fsdecode(path), size, None)
         agent = {
-            group: {name.replace(".", "/"): array for name, array in _arrays(file, group, path)}
+            group: {name.replace(".", "/"): array for name, array in _arrays(file, group)}
             for group in ("target", "optimizer")
         }
-        replay = dict(_arrays(file, "replay", path))
+        replay = dict(_arrays(file, "replay"))
+        if versions := changed_versions(file):
+            warnings.warn(
+                f"{os.fsdecode(path)} was saved with {', '.join(versions)}: with other versions, a "
+                "resumed run need not equal an uninterrupted one to the last bit",
+                stacklevel=2,
+            )
     run = make_run(config, render=render)
-    with keras_h5.report_damage(path):
-        run.agent.set_state(weights, agent)
+    with report_damage(path):
+        weights = [array for layer in layers for array in (layer.kernel, layer.bias)]
+        try:
+            run.agent.set_state(weights, agent)
+        except ValueError as error:
+            raise WeightsError(f"{os.fsdecode(path)}: cannot be resumed, {error}") from error
         run.replay.set_state(replay, state["replay_added"])
         run.streams.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]
@@ -200,21 +188,19 @@ def _config(state: dict[str, Any], path: str | os.PathLike[str]) -> Config:
         raise WeightsError(f"{path}: records settings that no run can have ({error})") from error
 
 
-def _read_json_state(file: h5py.File, path: str | os.PathLike[str]) -> dict[str, Any]:
+def _read_json_state(file: H5File, path: str | os.PathLike[str]) -> dict[str, Any]:
     if "run" not in file:
         raise WeightsError(
             f"{path}: holds weights without a run to resume; use --init to start a run from them"
         )
-    text = keras_h5.read_array(file["run/state"], path).tobytes()
-    state: dict[str, Any] = json.loads(text)
+    state: dict[str, Any] = json.loads(file.read("run/state").tobytes())
     return state
 
 
-def _arrays(
-    file: h5py.File, group: str, path: str | os.PathLike[str]
-) -> Iterator[tuple[str, NDArray[Any]]]:
-    for name, entry in file[group].items():
-        yield name, keras_h5.read_array(entry, path)
+def _arrays(file: H5File, group: str) -> Iterator[tuple[str, NDArray[Any]]]:
+    for name in file:
+        if name.startswith(f"{group}/"):
+            yield name.removeprefix(f"{group}/"), file.read(name)
 
 
 def _record(row: NDArray[np.float64]) -> EpisodeRecord:

@@ -114,20 +114,10 @@ def make_optimizer(config: Config) -> keras.optimizers.Optimizer:
 
 
 def _copy_weights(source: DQN, destination: DQN) -> None:
-    found, expected = _properties(source), _properties(destination)
-    for name in expected:
+    found, expected = source.get_config(), destination.get_config()
+    for name in ("environment", "observation_size", "hidden_units", "action_count", "activation"):
         if found[name] != expected[name]:
             raise ConfigError(
-                f"the initial network has {name} {found[name]}, the settings say {expected[name]}: "
-                "they must be the same"
+                f"the initial network has {name} {found[name]}, the settings say {expected[name]}"
             )
     destination.set_weights(source.get_weights())
-
-
-def _properties(network: DQN) -> dict[str, str]:
-    widths = (*network.hidden_units, network.action_count)
-    return {
-        "environment": network.provenance.environment,
-        "layers": "-".join(map(str, widths)),
-        "activation": network.activation,
-    }

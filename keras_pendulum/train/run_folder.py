@@ -24,8 +24,9 @@ class RunFolder:
         path: the folder.
         environment: of the run; None takes that of the checkpoint in the folder.
 
-    Raises UserError when the folder cannot be read, or when it holds the checkpoints of two
-    environments and `environment` is None.
+    Raises UserError when the folder cannot be read, when one of the run's files is a link or no
+    regular file, or when the folder holds the checkpoints of two environments and `environment` is
+    None.
     """
 
     def __init__(self, path: str | os.PathLike[str], environment: str | None = None) -> None:
@@ -50,6 +51,13 @@ class RunFolder:
         self.picture = self._real_path / "rewards.png"
         self.events = self._real_path / "tensorboard"
         self.require_not_moved: Callable[[], None] = lambda: None  # see folder_lock.lock_folder
+        for file in (*self.files, *self._other_checkpoints):
+            # Through a link, the run would replace a file of another folder.
+            if file.is_symlink() or (file.exists() and not file.is_file()):
+                raise UserError(
+                    f"{self.path / file.name} is a link, a folder or a device; a run writes a file "
+                    "there: remove it, or name another folder with --out"
+                )
 
     @property
     def files(self) -> list[Path]:
@@ -106,17 +114,35 @@ class RunFolder:
             _remove(*self._real_path.glob(f".{file.name}.*.tmp"))
         _remove(self.picture)
         write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
-        lines = [CSV_HEADER, *(record.csv_row() for record in history)]
-        write_atomically(self.history, "".join(line + "\n" for line in lines).encode())
+        self._write_history(history)
 
     def append(self, record: EpisodeRecord) -> None:
-        """Adds a row to history.csv. Raises UserError when it cannot be written."""
+        """Adds a row to history.csv, unless the file was removed; see `restore_history`.
+
+        Raises UserError when the row cannot be written.
+        """
         self.require_not_moved()
         try:
-            with open(self.history, "a", encoding="ascii") as file:
+            # Not mode "a": it would make a file without the rows before.
+            with open(self.history, "r+", encoding="ascii") as file:
+                file.seek(0, os.SEEK_END)
                 file.write(record.csv_row() + "\n")
+        except FileNotFoundError:
+            pass
         except OSError as error:
             raise UserError(f"cannot write {self.history}: {error.strerror}") from error
+
+    def restore_history(self, history: Iterable[EpisodeRecord]) -> None:
+        """Writes history.csv again if it was removed during the run.
+
+        Raises UserError when it cannot be written.
+        """
+        if not self.history.exists():
+            self._write_history(history)
+
+    def _write_history(self, history: Iterable[EpisodeRecord]) -> None:
+        lines = [CSV_HEADER, *(record.csv_row() for record in history)]
+        write_atomically(self.history, "".join(line + "\n" for line in lines).encode())
 
     def _event_files(self) -> list[Path]:
         # By their names: a folder called tensorboard may hold other files.

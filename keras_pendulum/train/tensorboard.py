@@ -24,13 +24,21 @@ class TensorBoardLog:
         folder: folder for the event files; it is created after the first episode.
         config: the settings of the run.
 
-    Raises UserError when the package tensorboard is not installed.
+    Raises UserError when the package tensorboard is not installed, or when the folder's name is no
+    text.
     """
 
     def __init__(self, folder: str | os.PathLike[str], config: Config) -> None:
         if importlib.util.find_spec("tensorboard") is None:
             raise UserError("tensorboard is not installed: pip install tensorboard")
         self._folder = os.fspath(folder)
+        try:
+            self._folder.encode()
+        except UnicodeEncodeError as error:  # TensorFlow takes no other names
+            raise UserError(
+                f"TensorBoard cannot write in {folder}, a name that is no UTF-8: name another "
+                "folder with --out, or leave out --tensorboard"
+            ) from error
         self._config = config
         self._writer_or_none: Any = None
 

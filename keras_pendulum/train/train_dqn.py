@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, require_type
 from keras_pendulum.evaluate.evaluation import optimal_training_return, random_return
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.phase_plane import run_phase_planes
@@ -63,7 +63,11 @@ def train_dqn(
         UserError: `resume` is combined with `init` or `overwrite`; `out` is in use, cannot be
             written or is moved meanwhile; or an observation, a reward, a loss or a weight is not
             finite. The last checkpoint then holds finite weights.
+        TypeError: `config` is no Config, or `init` is no DQN.
     """
+    require_type("config", config, Config)
+    if init is not None:
+        require_type("init", init, DQN)
     if resume and (init is not None or overwrite):
         raise UserError("resume continues a run; init and overwrite start a new one")
     listeners = list(listeners)
@@ -109,6 +113,7 @@ def _train_in_folder(
         def save() -> None:
             nonlocal last_saved
             last_saved = run.history[-1].episode
+            folder.restore_history(run.history)
             writer.save(run)
             on_checkpoint(run.agent.online, last_saved)
 
@@ -122,9 +127,13 @@ def _train_in_folder(
             save()
     if finished:
         planes = run_phase_planes(run.agent.online, config)
-        picture = run_figure.draw_run(
-            run.history, config.environment, _reference_returns(config), planes
-        )
+        returns = _reference_returns(config)
+        try:
+            picture = run_figure.draw_run(run.history, config.environment, returns, planes)
+        except (OSError, ImportError) as error:  # such as too many open files
+            raise UserError(
+                f"cannot draw {folder.picture}: {error}; the run is saved, and --resume draws it"
+            ) from error
         write_atomically(folder.picture, picture)
     return finished
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import keras
 import numpy as np
 import pytest
 
 from keras_pendulum.dqn.network import DQN, Provenance
+from keras_pendulum.dqn.policy import greedy_policy
 
 
 def test_default_network_is_that_of_the_original() -> None:
@@ -62,10 +67,12 @@ def test_glorot_weights_are_uniform_and_biases_0() -> None:
 
 def test_fan_in_weights_and_biases_are_uniform() -> None:
     weights = DQN((400, 300), initial_weights="fan-in").get_weights()
-    for kernel, bias in zip(weights[::2], weights[1::2], strict=True):
-        limit = len(kernel) ** -0.5
-        for array in (kernel, bias):
-            assert 0.9 * limit < abs(array).max() <= limit * (1 + 1e-6)
+    # 1/√inputs for 3, 400 and 300 inputs.
+    limits = [0.5773503, 0.05, 0.0577350]
+    for limit, kernel, bias in zip(limits, weights[::2], weights[1::2], strict=True):
+        for array, reached in ((kernel, 0.99), (bias, 0.9)):
+            assert -limit * (1 + 1e-6) <= array.min() < -reached * limit
+            assert reached * limit < array.max() <= limit * (1 + 1e-6)
         assert kernel.std() == pytest.approx(limit / np.sqrt(3), rel=0.05)
 
 
@@ -108,3 +115,43 @@ def test_variables_have_the_same_paths_in_every_network() -> None:
 
 def test_default_provenance_is_a_pendulum_of_unknown_origin() -> None:
     assert DQN((8,)).provenance == Provenance("Pendulum-v1", None, None, None, None)
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [copy.deepcopy, lambda network: pickle.loads(pickle.dumps(network))],
+    ids=["deepcopy", "pickle"],
+)
+def test_copy_is_an_equal_network(copied: Callable[[Any], Any]) -> None:
+    provenance = Provenance("CartPole-v1", None, "cartpole", 3, "{}")
+    network = DQN((8, 6), 2, observation_size=4, activation="relu,tanh", provenance=provenance)
+    copy = copied(network)
+    observations = np.random.RandomState(0).randn(5, 4).astype(np.float32)
+    np.testing.assert_array_equal(copy(observations), network(observations))
+    assert (type(copy), copy.provenance) == (DQN, provenance)
+    copy.head.bias.assign([1, 2])
+    assert not np.array_equal(copy(observations), network(observations))
+
+
+def test_clone_model_makes_the_same_layers_with_new_weights() -> None:
+    network = DQN((8, 6), activation="relu,tanh", seed=1)
+    clone = keras.models.clone_model(network)
+    assert clone.get_config() == network.get_config()
+    assert not np.array_equal(clone.get_weights()[0], network.get_weights()[0])
+
+
+def test_file_of_keras_holds_an_equal_network(tmp_path: Path) -> None:
+    network = DQN((8,), provenance=Provenance(gravity=2.5))
+    network.save(tmp_path / "a.keras")
+    loaded = keras.models.load_model(tmp_path / "a.keras")
+    observations = np.random.RandomState(0).randn(5, 3).astype(np.float32)
+    np.testing.assert_array_equal(loaded(observations), network(observations))
+    assert loaded.provenance == network.provenance
+
+
+@pytest.mark.parametrize("activation", ["elu", "tanh,relu", "tanh,relu,tanh,relu"])
+def test_unknown_activations_and_another_number_of_them_are_refused(activation: str) -> None:
+    network = DQN((8, 8, 8), activation="tanh,relu,linear")
+    assert [layer.activation.__name__ for layer in network.hidden] == ["tanh", "relu", "linear"]
+    with pytest.raises((ValueError, KeyError)):
+        greedy_policy(DQN((8, 8, 8), activation=activation))

@@ -73,6 +73,15 @@ def test_set_state_continues_both_streams(through_json: bool) -> None:
     assert draws(restored) == expected
 
 
+@pytest.mark.parametrize("position", [0, 624])
+def test_set_state_accepts_the_first_and_the_last_position(position: int) -> None:
+    state = RandomStreams(3).get_state()
+    state["exploration"][2] = position
+    streams = RandomStreams(0)
+    streams.set_state(state)
+    assert streams.get_state()["exploration"][2] == position
+
+
 @pytest.mark.parametrize(
     ("stream", "position", "value"),
     [

@@ -106,6 +106,12 @@ def test_batch_larger_than_the_stored_transitions_is_refused(capacity: int, coun
         replay.sample(5, random.Random(0))
 
 
+@pytest.mark.parametrize(("capacity", "count", "stored"), [(10, 4, 4), (4, 4, 4), (4, 11, 4)])
+def test_batch_of_all_stored_transitions_is_drawn(capacity: int, count: int, stored: int) -> None:
+    batch = filled(capacity, count).sample(stored, random.Random(0))
+    assert sorted(batch.action[0].tolist()) == list(range(count - stored, count))
+
+
 @pytest.mark.parametrize("count", [0, 3, 4, 5, 11])
 def test_set_state_continues_like_the_saved_buffer(count: int) -> None:
     saved = filled(4, count)

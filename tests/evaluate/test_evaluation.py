@@ -208,3 +208,10 @@ def test_cartpole_has_no_evaluation_gravity() -> None:
             kp.ConfigError, match=r"^gravity belongs to Pendulum-v1; CartPole-v1 has none$"
         ):
             evaluation_gravity(provenance, gravity)
+
+
+def test_network_that_is_not_finite_is_refused() -> None:
+    network = kp.DQN((4,))
+    network.head.kernel.assign(np.full((4, 41), np.inf))
+    with pytest.raises(kp.UserError, match="a weight is not finite"):
+        kp.evaluate_policy(network, 1)

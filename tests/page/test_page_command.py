@@ -7,13 +7,13 @@ import webbrowser
 from pathlib import Path
 
 import pytest
-from conftest import DATA, Command, Refusal
+from conftest import ROOT, Command, Refusal
 
 import keras_pendulum as kp
 from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.page.build import build_page
 
-RECORDED = DATA / "pendulum_weight.keras2.h5"
+RECORDED = ROOT / "weights" / "original.h5"
 
 
 def test_command_writes_one_small_file_and_prints_its_address(

@@ -222,7 +222,7 @@ def test_invalid_torque_is_refused_before_the_environment(torque: float) -> None
 
 @pytest.fixture(scope="module")
 def agent() -> Policy:
-    return play_command._load_agent("reference", None)[0]
+    return play_command._load_agent("reference", None, None)[0]
 
 
 def test_agent_drives_the_same_start_and_three_returns_are_printed(
@@ -377,7 +377,7 @@ class Screen:
             capture_output=True,
             text=True,
             check=False,
-            timeout=20,
+            timeout=60,
         ).stdout.strip()
 
     def stop(self) -> None:
@@ -454,7 +454,7 @@ class WindowCommand:
         self.screen.xdotool("key", key)
 
     def wait_for(self, condition: Callable[[], bool]) -> None:
-        until = time.monotonic() + 20
+        until = time.monotonic() + 60
         while time.monotonic() < until and self.process.poll() is None:
             if condition():
                 return

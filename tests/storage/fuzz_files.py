@@ -1,83 +1,176 @@
-"""Loads files with random damage, in the layouts of Keras 2 and Keras 3 and without a checksum.
+"""Damages files at random, with a fixed seed, and loads them.
 
-    python tests/storage/fuzz_files.py [SEED [COUNT]]
-
-Each file must be refused in one line or load as a network of finite numbers. A load of more than
-ten seconds ends the program with a traceback, a crash ends it too. Prints the number of refused and
-of loaded files. 1000 files take half a minute.
+Four layouts are damaged: that of this package without its checksum, a whole model as `.h5`, the
+weights of Keras 3, and the zip file `.keras`. A damaged file must be refused in one line or load.
+Without a checksum a file with another number in it loads as another network.
 """
 
 from __future__ import annotations
 
-import faulthandler
-import sys
-import tempfile
+import re
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from random import Random
+from typing import Any
 
-import numpy as np
+from hostile_files import HOSTILE, KERNEL, read_members, write, write_members, write_sound
+from load_files import SECONDS, Loader, Outcome
 
-import keras_pendulum as kp
-
-CHANGES = (1, 1, 2, 4, 16)  # per file
-
-
-def damaged(content: bytes, random: Random) -> bytes:
-    """Returns the file with flipped bits, extreme values, or copied bytes at random offsets."""
-    changed = bytearray(content)
-    for _ in range(random.choice(CHANGES)):
-        offset = random.randrange(len(changed))
-        kind = random.randrange(4)
-        if kind == 0:
-            changed[offset] ^= 1 << random.randrange(8)
-        elif kind == 1:
-            changed[offset] = random.choice((0, 1, 127, 128, 255))
-        elif kind == 2:
-            length = random.choice((2, 4, 8))
-            changed[offset : offset + length] = random.choice((b"\xff", b"\0", b"\x7f")) * length
-        else:
-            length = random.randrange(1, 64)
-            source = random.randrange(len(changed))
-            changed[offset : offset + length] = changed[source : source + length]
-    return bytes(changed)
+LAYOUTS = (*KERNEL, "keras")
+Row = dict[str, Any]
+_STRUCTURES = re.compile(rb"TREE|HEAP|SNOD|GCOL|OHDR|FRHP|BTHD|PK\x03\x04|PK\x01\x02|PK\x05\x06")
 
 
-def outcome(path: Path) -> str:
-    """Returns "refused" or "loaded". Raises AssertionError for any other outcome."""
-    try:
-        network = kp.load_weights(path)
-    except kp.WeightsError as error:
-        assert str(error).startswith(str(path)), error
-        assert "\n" not in str(error), error
-        return "refused"
-    assert all(np.isfinite(array).all() for array in network.get_weights()), path
-    return "loaded"
+def random_bytes(content: bytearray, random: Random) -> None:
+    start = random.randrange(len(content))
+    for i in range(start, min(start + random.choice((1, 1, 2, 4, 16, 256)), len(content))):
+        content[i] = random.randrange(256)
 
 
-def main(seed: str = "0", count: str = "1000") -> None:
-    """Loads `count` files and prints the outcomes."""
-    random = Random(int(seed))
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        network = kp.DQN((16, 8), 5)
-        network.save_weights(folder / "keras3.weights.h5")
-        kp.save_weights(network, folder / "keras2.h5")
-        with_checksum = (folder / "keras2.h5").read_bytes()
-        originals = [
-            with_checksum[: with_checksum.rindex(b"\nkeras_pendulum sha256")],
-            (folder / "keras3.weights.h5").read_bytes(),
-            (Path(__file__).parents[1] / "data" / "pendulum_weight.keras2.h5").read_bytes(),
-        ]
-        outcomes: Counter[str] = Counter()
-        for _ in range(int(count)):
-            path = folder / "damaged.h5"
-            path.write_bytes(damaged(random.choice(originals), random))
-            faulthandler.dump_traceback_later(10, exit=True)
-            outcomes[outcome(path)] += 1
-            faulthandler.cancel_dump_traceback_later()
-    print(", ".join(f"{times} {what}" for what, times in sorted(outcomes.items())))
+def flipped_bits(content: bytearray, random: Random) -> None:
+    for _ in range(random.choice((1, 1, 2, 4, 16))):
+        content[random.randrange(len(content))] ^= 1 << random.randrange(8)
 
 
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+def zeroed_block(content: bytearray, random: Random) -> None:
+    start = random.randrange(len(content))
+    end = min(start + random.choice((8, 64, 512, 4096)), len(content))
+    content[start:end] = bytes(end - start)
+
+
+def truncated(content: bytearray, random: Random) -> None:
+    del content[random.randrange(len(content)) :]
+
+
+def duplicated_block(content: bytearray, random: Random) -> None:
+    """Copies a block over another one, or inserts it."""
+    source, target = random.randrange(len(content)), random.randrange(len(content))
+    block = content[source : source + random.choice((8, 32, 128, 1024))]
+    end = target if random.random() < 0.3 else target + len(block)
+    content[target:end] = block
+
+
+def replaced_words(content: bytearray, random: Random) -> None:
+    """Replaces words of 8 bytes by addresses of structures, by sizes and by extreme numbers."""
+    structures = [match.start() for match in _STRUCTURES.finditer(content)] or [0]
+    words = (0, 1, 8, 2**31, 2**32 - 1, 2**63 - 1, 2**64 - 1, len(content), len(content) - 1)
+    for _ in range(random.choice((1, 1, 1, 2, 4))):
+        start = random.choice(structures) if random.random() < 0.6 else -1
+        offset = (
+            random.randrange(0, max(len(content) - 8, 1), 8)
+            if start < 0
+            else start + 8 * random.randrange(8)
+        )
+        word = random.choice(words if random.random() < 0.5 else structures)
+        content[offset : offset + 8] = word.to_bytes(8, "little")
+
+
+KINDS = (
+    *(random_bytes, flipped_bits, zeroed_block, truncated, duplicated_block),
+    *(replaced_words, replaced_words),
+)
+
+
+def damage(sound: Path, damaged: Path, seed: str) -> None:
+    """Writes a damaged copy of a sound file. The same seed damages equal files alike."""
+    random = Random(seed)
+    kind = random.choice(KINDS)
+    if sound.suffix == ".keras" and random.random() < 0.7:
+        # The zip file's own checksums would refuse other damage of a member.
+        members = read_members(sound)
+        name = random.choice(("config.json", "model.weights.h5", "model.weights.h5"))
+        content = bytearray(members[name])
+        kind(content, random)
+        write_members(damaged, {**members, name: bytes(content)})
+    else:
+        content = bytearray(sound.read_bytes())
+        kind(content, random)
+        damaged.write_bytes(content)
+
+
+Failures = list[tuple[str, Outcome]]
+
+
+class Sums:
+    """The sums of the outcomes of several loads."""
+
+    def __init__(self, file: str) -> None:
+        self._file = file
+        self._outcomes: Counter[str] = Counter()
+        self._seconds = self._memory = self._child_memory = 0.0
+        self.failures: Failures = []
+
+    def add(self, name: str, path: Path, outcome: Outcome, expected: str) -> None:
+        """Counts a load of the file `path`, of which a sound copy loads as `expected`."""
+        kind = _kind(outcome, expected, path)
+        self._outcomes[kind] += 1
+        if kind in ("failed", "crashed", "endless"):
+            self.failures.append((name, outcome))
+        self._seconds = max(self._seconds, outcome.seconds)
+        self._memory = max(self._memory, outcome.memory)
+        self._child_memory = max(self._child_memory, outcome.child_memory)
+
+    def row(self) -> Row:
+        return {
+            "file": self._file,
+            "files": self._outcomes.total(),
+            "refused": self._outcomes["refused"],
+            "loaded, equal": self._outcomes["equal"],
+            "loaded, other": self._outcomes["other"],
+            "failed": self._outcomes["failed"],
+            "crashed": self._outcomes["crashed"],
+            f"over {SECONDS:.0f} s": self._outcomes["endless"],
+            "slowest, ms": round(self._seconds * 1e3),
+            "memory, MB": round(self._memory, 1),
+            "memory of the child, MB": round(self._child_memory, 1),
+        }
+
+
+def _kind(outcome: Outcome, expected: str, path: Path) -> str:
+    if outcome.kind == "loaded":
+        return "equal" if outcome.text == expected else "other"
+    if outcome.kind == "refused":
+        one_line = outcome.text.isprintable() and str(path) in outcome.text
+        return "refused" if one_line else "failed"
+    return outcome.kind
+
+
+def fuzz(count: int, folder: Path, seed: int = 0) -> Iterator[tuple[Row, Failures]]:
+    """Loads `count` damaged files of each layout.
+
+    Yields a row of sums for each layout, and its failures: the seed and the outcome of each load
+    that crashed, took too long, or raised another error than one line of WeightsError.
+    """
+    for layout in LAYOUTS:
+        suffix = ".keras" if layout == "keras" else ".h5"
+        sound = write_sound(folder / f"sound{suffix}", layout)
+        damaged = folder / f"damaged{suffix}"
+        sums = Sums(f"damaged at random, {layout}")
+        with Loader(sound) as loader:
+            expected = loader.load(sound).text
+            for i in range(count):
+                name = f"{seed} {layout} {i}"
+                damage(sound, damaged, name)
+                sums.add(name, damaged, loader.load(damaged), expected)
+        yield sums.row(), sums.failures
+
+
+def measure_hostile_files(folder: Path) -> Iterator[tuple[Row, Failures]]:
+    """Loads each hostile file; yields a row for each kind, and its failures."""
+    kinds: dict[str, list[str]] = {}
+    for kind, layout in HOSTILE:
+        kinds.setdefault(kind, []).append(layout)
+    sound = {
+        layout: write_sound(folder / f"{i}{'.keras' if layout == 'keras' else '.h5'}", layout)
+        for i, layout in enumerate(LAYOUTS)
+    }
+    with Loader(sound["this package"]) as loader:
+        expected = {layout: loader.load(path).text for layout, path in sound.items()}
+        for kind, layouts in kinds.items():
+            sums = Sums(kind)
+            for layout in layouts:
+                path = write(kind, layout, folder)
+                sums.add(f"{kind}, {layout}", path, loader.load(path), expected[layout])
+                path.unlink()
+            yield sums.row(), sums.failures

@@ -6,6 +6,8 @@ import multiprocessing
 import os
 import resource
 import shutil
+import socket
+import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -16,7 +18,7 @@ import pytest
 from save_constantly import save_constantly
 
 import keras_pendulum as kp
-from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 
 LARGE = 4_500_000  # bytes, as a checkpoint of `reference`
 
@@ -69,9 +71,71 @@ def test_link_stays_and_its_target_is_replaced(tmp_path: Path) -> None:
     assert [entry.name for entry in file.parent.iterdir()] == ["a.h5"]
 
 
+@pytest.mark.parametrize("kind", ["pipe", "socket", "device", "link to a pipe", "folder"])
+def test_what_is_no_file_is_not_replaced(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    if kind == "socket":
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(str(path))
+    elif kind == "device":
+        path.symlink_to("/dev/null")
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        os.mkfifo(tmp_path / "pipe")
+        path.symlink_to("pipe")
+    before = {file: (file.lstat().st_mode, file.lstat().st_ino) for file in tmp_path.iterdir()}
+    with pytest.raises(kp.UserError, match=r"cannot write .*a: it is a .*; name a file"):
+        kp.save_weights(kp.DQN((8,)), path)
+    assert {
+        file: (file.lstat().st_mode, file.lstat().st_ino) for file in tmp_path.iterdir()
+    } == before
+
+
+def test_link_to_an_open_pipe_is_not_replaced(tmp_path: Path) -> None:
+    reading, writing = os.pipe()
+    try:
+        with pytest.raises(kp.UserError, match="it is a device, a pipe or a socket"):
+            write_atomically(f"/dev/fd/{writing}", b"new")
+    finally:
+        os.close(reading)
+        os.close(writing)
+
+
+def test_folder_is_flushed_after_the_new_file_is_in_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.h5"
+    flushed: list[tuple[str, bool]] = []
+
+    def fsync(descriptor: int) -> None:
+        is_folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
+        flushed.append(("folder" if is_folder else "file", path.exists()))
+        if is_folder:
+            raise OSError(22, "Invalid argument")  # a system that cannot flush a folder
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    write_atomically(path, b"new")
+    assert flushed == [("file", False), ("folder", True)]
+    assert path.read_bytes() == b"new"
+
+
 def test_missing_folder_raises(tmp_path: Path) -> None:
     with pytest.raises(kp.UserError, match=r"cannot write .*: No such file or directory"):
         write_atomically(tmp_path / "gone" / "a.h5", b"new")
+
+
+def test_file_of_another_kind_is_not_replaced(tmp_path: Path) -> None:
+    for name, content in {"a.gif": b"GIF89a", "a.h5": b"\x89HDF", "empty": b""}.items():
+        (tmp_path / name).write_bytes(content)
+    os.mkfifo(tmp_path / "fifo")
+    for name in ("a.gif", "missing", "."):  # writing to a folder fails later
+        require_no_other_file(tmp_path / name, b"GIF8", "a GIF")
+    for name in ("a.h5", "empty", "fifo"):
+        with pytest.raises(kp.UserError, match=f"{name} holds something else than a GIF"):
+            require_no_other_file(tmp_path / name, b"GIF8", "a GIF")
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -9,6 +10,7 @@ from random import Random
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.storage.checksum import verify, write_with_checksum
 from keras_pendulum.train.checkpoint import load_checkpoint
 
 
@@ -92,3 +94,29 @@ def test_incomplete_checksum_or_bytes_behind_it_are_refused(
 def test_file_without_checksum_loads(checkpoint: bytes, tmp_path: Path) -> None:
     end = checkpoint.rindex(b"\nkeras_pendulum sha256")
     assert not refused(resume, tmp_path / "plain.h5", checkpoint[:end])
+
+
+def hdf5_file(content_size: int, recorded_end: int) -> bytes:
+    """Returns a file that begins like HDF5 and records where its content ends."""
+    head = b"\x89HDF\r\n\x1a\n\x00".ljust(40, b"\x00") + recorded_end.to_bytes(8, "little")
+    return head + Random(0).randbytes(content_size - len(head))
+
+
+@pytest.mark.parametrize("size", [64, 1000, 2**20, 2**20 + 1, 3 * 2**20 + 5])
+def test_checksum_of_any_size_is_accepted_and_of_another_content_refused(
+    size: int, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.h5"
+    write_with_checksum(path, hdf5_file(size, size))
+    with open(path, "rb") as file:
+        verify(file)
+    changed = bytearray(path.read_bytes())
+    changed[size - 1] ^= 1
+    with pytest.raises(kp.WeightsError, match=r"^the file is damaged"):
+        verify(io.BytesIO(changed))
+
+
+def test_file_that_is_shorter_than_a_checksum_is_refused() -> None:
+    with pytest.raises(kp.WeightsError, match=r"^the file is damaged"):
+        verify(io.BytesIO(hdf5_file(70, 69)))
+    verify(io.BytesIO(hdf5_file(70, 70)))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import sys
 import time
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,7 @@ import h5py
 import keras
 import numpy as np
 import pytest
+import tensorflow as tf
 from conftest import DATA
 
 import keras_pendulum as kp
@@ -103,6 +107,15 @@ def test_keras_2_loads_a_saved_file(make: Callable[..., Any], keras2: Any, tmp_p
     assert_same_values(model, network(), 1e-6)
 
 
+def test_file_records_the_versions_of_the_installed_packages(tmp_path: Path) -> None:
+    kp.save_weights(network(), tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5") as file:
+        found = json.loads(file["keras_pendulum"].attrs["versions"])
+    packages = {name: version(name) for name in ("keras", "gymnasium", "numpy")}
+    python = ".".join(map(str, sys.version_info[:3]))
+    assert found == {"python": python, "tensorflow": tf.__version__, **packages}
+
+
 @pytest.mark.parametrize("make_name", ["subclassed", "sequential"])
 def test_keras_2_and_3_load_a_checkpoint(make_name: str, keras2: Any, tmp_path: Path) -> None:
     make = {"subclassed": subclassed, "sequential": sequential}[make_name]
@@ -121,7 +134,7 @@ def test_load_weights_reads_keras_2_files_of_other_sizes(
 ) -> None:
     model = subclassed(keras2, hidden, actions)
     model.save_weights(str(tmp_path / "a.h5"))
-    loaded = kp.load_weights(tmp_path / "a.h5")
+    loaded = kp.load_weights(tmp_path / "a.h5", "tanh")
     assert (loaded.hidden_units, loaded.action_count) == (hidden, actions)
     assert_same_values(loaded, model, 1e-6)
 
@@ -130,7 +143,7 @@ def test_load_weights_reads_a_keras_2_sequential(keras2: Any, tmp_path: Path) ->
     layers = [keras2.layers.Flatten(), *dense_layers(keras2, (16, 8), 5)]
     model = keras2.Sequential([keras2.Input((3,)), *layers, keras2.layers.Activation("linear")])
     model.save_weights(str(tmp_path / "a.h5"))
-    assert_same_values(kp.load_weights(tmp_path / "a.h5"), model, 1e-6)
+    assert_same_values(kp.load_weights(tmp_path / "a.h5", "tanh"), model, 1e-6)
 
 
 @pytest.mark.parametrize("make", [subclassed, sequential])
@@ -140,23 +153,23 @@ def test_load_weights_reads_keras_3_files(make: Callable[..., Any], tmp_path: Pa
     model.compile("adam", "mse")
     model.train_on_batch(OBSERVATIONS, np.zeros((20, 5)))  # so that it has an optimizer to save
     model.save_weights(tmp_path / "a.weights.h5")
-    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), model, 1e-6)
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5", "tanh"), model, 1e-6)
 
 
 def test_load_weights_reads_a_keras_3_file_of_a_dqn(tmp_path: Path) -> None:
     network().save_weights(tmp_path / "a.weights.h5")
-    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), network(), 0)
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5", "tanh"), network(), 0)
 
 
 def test_load_weights_orders_named_layers_by_their_sizes(tmp_path: Path) -> None:
     model = named_layers(zebra=16, apple=8, mango=5)
     model.save_weights(tmp_path / "a.weights.h5")
-    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5"), model, 1e-6)
+    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5", "tanh"), model, 1e-6)
 
 
 def test_layers_of_unclear_order_are_refused(tmp_path: Path) -> None:
     named_layers(zebra=8, apple=8, mango=8, kiwi=5).save_weights(tmp_path / "a.weights.h5")
-    with pytest.raises(kp.WeightsError, match=r"order of its layers .* unclear"):
+    with pytest.raises(kp.WeightsError, match=r"not record the order of its layers .*mango"):
         kp.load_weights(tmp_path / "a.weights.h5")
 
 
@@ -251,7 +264,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
         make_changed(lambda f: f.attrs.__delitem__("layer_names")),
         "no network weights",
     ),
-    "convolution": (other_model, "expected a kernel"),
+    "convolution": (other_model, "layer conv2d is a conv2d"),
     "cartpole": (
         lambda path: save_unchecked(kp.DQN((8,), 2, observation_size=4), path),
         "has 4 inputs",
@@ -265,7 +278,10 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
         make_changed(replace_array("dense_1/dense_1/bias:0", np.zeros(9, "f4"))),
         "expected a kernel",
     ),
-    "missing bias": (make_changed(lambda f: f.__delitem__("dense_1/dense_1/bias:0")), "damaged"),
+    "missing bias": (
+        make_changed(lambda f: f.__delitem__("dense_1/dense_1/bias:0")),
+        "has no array dense_1/dense_1/bias:0",
+    ),
     "nan": (make_changed(lambda f: set_value(f, np.nan)), "NaN or infinite"),
     "inf": (make_changed(lambda f: set_value(f, np.inf)), "NaN or infinite"),
     "too large for float32": (
@@ -290,7 +306,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "too wide": (make_changed(make_too_wide), "expected 1 to 8192"),
     "activation": (
         make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "elu")),
-        "activation 'elu'",
+        "records the activation 'elu'",
     ),
     "environment": (
         make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("environment", "Acrobot-v1")),
@@ -326,7 +342,6 @@ def test_bad_file_is_refused_in_one_line_that_names_it(kind: str, tmp_path: Path
     [
         (lambda: kp.DQN((8,), 1), "the network has one output"),
         (lambda: kp.DQN((8193,), 2), "has 8193 units; expected 1 to 8192"),
-        (lambda: kp.DQN((8,), activation="elu"), "records the activation 'elu'"),
         (lambda: kp.DQN((8,), observation_size=4), "has 4 inputs; expected 3"),
         (
             lambda: kp.DQN((8,), provenance=Provenance(gravity=1000.0)),
@@ -392,7 +407,7 @@ def test_save_weights_replaces_the_old_file_and_never_writes_into_it(
 
 
 def test_recorded_keras_2_file_loads() -> None:
-    loaded = kp.load_weights(DATA / "pendulum_weight.keras2.h5")
+    loaded = kp.load_weights(DATA / "pendulum_weight.keras2.h5", "tanh")
     assert (loaded.hidden_units, loaded.action_count) == ((512, 256, 128), 41)
     assert loaded.provenance.gravity is None
 
@@ -413,3 +428,44 @@ def test_find_weights_returns_a_shipped_file_unless_the_current_folder_has_that_
     (tmp_path / "folder").mkdir()
     with pytest.raises(kp.WeightsError, match="folder: not a file"):
         kp.find_weights("folder")
+
+
+def test_keras_file_of_a_dqn_loads_with_its_provenance(tmp_path: Path) -> None:
+    saved = kp.DQN((5, 5, 5, 5), 5, activation="relu", provenance=network().provenance)
+    saved.save(tmp_path / "a.keras")
+    loaded = kp.load_weights(tmp_path / "a.keras")
+    assert_same_values(loaded, saved)
+    assert (loaded.provenance, loaded.activation) == (saved.provenance, "relu")
+
+
+def test_activation_is_for_files_that_record_none(tmp_path: Path) -> None:
+    model = sequential(keras)
+    model.save_weights(tmp_path / "a.weights.h5")
+    assert kp.load_weights(tmp_path / "a.weights.h5", "relu").activation == "relu"
+    kp.save_weights(kp.DQN((8,), activation="relu"), tmp_path / "b.h5")
+    assert kp.load_weights(tmp_path / "b.h5", "relu").activation == "relu"
+    with pytest.raises(kp.WeightsError, match="records the activation relu, not tanh"):
+        kp.load_weights(tmp_path / "b.h5", "tanh")
+    with pytest.raises(kp.ConfigError, match="activation is elu"):
+        kp.load_weights(tmp_path / "a.weights.h5", "elu")
+
+
+@pytest.mark.parametrize("name", ["preset", "config", "activation", "environment", "gravity"])
+def test_attribute_that_is_no_text_is_refused_by_name(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    kp.save_weights(network(), path)
+    with h5py.File(path, "r+") as file:
+        file["keras_pendulum"].attrs[name] = np.bytes_(b"\xff")
+    with pytest.raises(kp.WeightsError, match=f"the attribute {name} is neither text nor a number"):
+        kp.load_weights(path)
+
+
+def test_network_that_is_not_finite_is_neither_saved_nor_loaded(tmp_path: Path) -> None:
+    broken = network()
+    broken.head.bias.assign([0, 1, np.nan, 3, 4])
+    with pytest.raises(kp.UserError, match="a weight is not finite"):
+        kp.save_weights(broken, tmp_path / "a.h5")
+    broken.save_weights(tmp_path / "a.weights.h5")
+    with pytest.raises(kp.WeightsError, match="head/vars/1 holds NaN or infinite numbers"):
+        kp.load_weights(tmp_path / "a.weights.h5", "tanh")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.weights.h5"]

@@ -218,7 +218,7 @@ CHECKPOINT_DAMAGE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "no history": (lambda file: file["run"].__delitem__("history"), "damaged"),
     "state is a group": (
         lambda file: replace_entry(file, "run/state", None),
-        "/run/state is not an array",
+        "has no array run/state",
     ),
     "state is not JSON": (
         lambda file: replace_entry(file, "run/state", np.zeros(50, np.uint8)),
@@ -253,11 +253,11 @@ CHECKPOINT_DAMAGE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     ),
     "NaN in the optimizer": (
         lambda file: replace_entry(file, f"optimizer/{MOMENTUM}", np.full(41, np.nan, np.float32)),
-        f"/optimizer/{MOMENTUM} holds NaN or infinite numbers",
+        f"optimizer/{MOMENTUM} holds NaN or infinite numbers",
     ),
     "infinity in the target": (
         lambda file: file["target/dqn.head.bias"].__setitem__(0, np.inf),
-        "/target/dqn.head.bias holds NaN or infinite numbers",
+        "target/dqn.head.bias holds NaN or infinite numbers",
     ),
 }
 
@@ -392,3 +392,26 @@ def test_error_of_the_environment_is_not_reported_as_damage(
     monkeypatch.setattr("keras_pendulum.train.run.make_environment", no_window)
     with pytest.raises(RuntimeError, match=r"^no window$"):
         load_checkpoint(tmp_path / "pendulum_weight.h5", config)
+
+
+def test_checkpoint_of_other_versions_is_resumed_with_one_warning(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    path = tmp_path / "pendulum_weight.h5"
+    with h5py.File(path, "r+") as file:
+        attributes = file["keras_pendulum"].attrs
+        versions = {**json.loads(attributes["versions"]), "keras": "3.0.0", "numpy": "2.0.0"}
+        attributes["versions"] = np.bytes_(json.dumps(versions))
+        attributes["version"] = np.bytes_("0.0.1")
+    with pytest.warns(UserWarning) as caught:
+        run = load_checkpoint(path, config)
+    (message,) = (str(warning.message) for warning in caught)
+    assert message.startswith(f"{path} was saved with keras_pendulum 0.0.1, keras 3.0.0, numpy 2.0")
+    assert len(run.history) == 2
+
+
+@pytest.mark.filterwarnings("error")
+def test_checkpoint_of_the_same_versions_is_resumed_without_warning(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    load_checkpoint(tmp_path / "pendulum_weight.h5", config)

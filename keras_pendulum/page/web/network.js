@@ -4,8 +4,9 @@
 class Network {
   /**
    * @param {{sizes: number[], activation: string, weights: string}} recorded sizes of all
-   *   layers, the observation's 3 first; weights as base64 of float32: kernel [in, out] and bias
-   *   [out] of each layer in order.
+   *   layers, the observation's 3 first; one activation for all hidden layers, or one for each,
+   *   separated by commas; weights as base64 of float32: kernel [in, out] and bias [out] of each
+   *   layer in order.
    */
   constructor({ sizes, activation, weights }) {
     const numbers = Network.#decoded(weights);
@@ -14,11 +15,12 @@ class Network {
       throw new Error(`it contains ${numbers.length} weights; expected ${expected}`);
     }
     let start = 0;
+    const activations = activation.split(",").map((name) => Network.#ACTIVATIONS[name]);
     const taken = (count) => numbers.subarray(start, (start += count));
     this.layers = sizes.slice(1).map((units, i) => ({
       kernel: taken(sizes[i] * units),
       bias: taken(units),
-      activate: i === sizes.length - 2 ? (x) => x : Network.#ACTIVATIONS[activation],
+      activate: i === sizes.length - 2 ? (x) => x : (activations[i] ?? activations[0]),
       sums: new Float64Array(units),
       output: new Float32Array(units),
     }));
@@ -29,7 +31,7 @@ class Network {
     this.torques[count - 1] = MAX_TORQUE;
   }
 
-  static #ACTIVATIONS = { tanh: Math.tanh, relu: (x) => (x > 0 ? x : 0) };
+  static #ACTIVATIONS = { tanh: Math.tanh, relu: (x) => (x > 0 ? x : 0), linear: (x) => x };
 
   static #decoded(text) {
     const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));

@@ -1,0 +1,168 @@
+"""Loads files in another process, which a crash or an endless loop may end.
+
+    python tests/storage/load_files.py
+
+reads a function's name and a path per line of its input, and prints a JSON object for each.
+`Loader` starts this program and measures it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import queue
+import subprocess
+import sys
+import threading
+import time
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import psutil
+
+SECONDS = 10.0  # a load that takes longer counts as endless
+_START = 120.0  # seconds for the import of TensorFlow
+_MB = 1e6
+
+
+class Outcome(NamedTuple):
+    """The outcome of one load."""
+
+    kind: str  # "refused", "loaded", "failed" (another exception), "crashed" or "endless"
+    text: str  # the error, or the SHA-256 of the loaded network
+    seconds: float
+    memory: float  # MB, growth of the process that loads the file
+    child_memory: float  # MB, growth of its child processes over a load of a sound file
+
+
+class Loader:
+    """A process that loads files. It starts anew after a crash and after `SECONDS`.
+
+    Args:
+        sound: a file that loads. It is loaded first, so that imports do not count.
+    """
+
+    def __init__(self, sound: Path) -> None:
+        self._sound = sound
+        self._process: subprocess.Popen[str] | None = None
+        self._children_before = 0.0
+
+    def __enter__(self) -> Loader:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._end()
+
+    def load(self, path: Path, function: str = "load_weights") -> Outcome:
+        """Returns the outcome of `load_weights` or `load_config` for the file."""
+        if self._process is None:
+            self._start()
+        return self._load(path, function, SECONDS)
+
+    def _start(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, __file__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            encoding="utf-8",
+        )
+        self._answers: queue.Queue[str] = queue.Queue()
+        threading.Thread(target=self._read, args=(self._process,), daemon=True).start()
+        warm_up = self._load(self._sound, "load_weights", _START)
+        assert warm_up.kind == "loaded", warm_up
+        self._children_before = _resident(_children(psutil.Process(self._process.pid)))
+
+    def _read(self, process: subprocess.Popen[str]) -> None:
+        answers = self._answers
+        assert process.stdout is not None
+        for line in process.stdout:
+            answers.put(line)
+        answers.put("")  # the process has ended
+
+    def _load(self, path: Path, function: str, limit: float) -> Outcome:
+        assert self._process is not None and self._process.stdin is not None
+        process = psutil.Process(self._process.pid)
+        before = _resident([process])
+        growth = child_growth = 0.0
+        children: list[psutil.Process] = []
+        listed = 0.0
+        started = time.perf_counter()
+        self._process.stdin.write(json.dumps([function, str(path)]) + "\n")
+        self._process.stdin.flush()
+        answer = None
+        while answer is None and time.perf_counter() - started < limit:
+            try:
+                answer = self._answers.get(timeout=0.002)
+            except queue.Empty:
+                if time.perf_counter() - listed > 0.05:  # a list of all processes takes long
+                    children, listed = _children(process), time.perf_counter()
+            growth = max(growth, _resident([process]) - before)
+            child_growth = max(child_growth, _resident(children) - self._children_before)
+        seconds = time.perf_counter() - started
+        if answer:
+            kind, text = json.loads(answer)
+        else:
+            kind, text = ("endless" if answer is None else "crashed"), ""
+            self._end()
+        return Outcome(kind, text, seconds, growth, child_growth)
+
+    def _end(self) -> None:
+        if self._process is not None:
+            for process in (*_children(psutil.Process(self._process.pid)), self._process):
+                process.kill()
+            self._process.wait()
+            self._process = None
+
+
+def _children(process: psutil.Process) -> list[psutil.Process]:
+    """Returns the child processes. A fork that has not become another program is none of them."""
+    try:
+        name = process.cmdline()
+        return [child for child in process.children(recursive=True) if child.cmdline() != name]
+    except psutil.NoSuchProcess:
+        return []
+
+
+def _resident(processes: list[psutil.Process]) -> float:
+    """Returns the resident memory of the processes that are alive, in MB."""
+    total = 0.0
+    for process in processes:
+        try:
+            total += process.memory_info().rss / _MB
+        except psutil.NoSuchProcess:
+            continue
+    return total
+
+
+def main() -> None:
+    """Loads the files that standard input names."""
+    import keras_pendulum as kp
+    from keras_pendulum.train.checkpoint import load_config
+
+    warnings.simplefilter("ignore")
+    functions: dict[str, Any] = {"load_weights": kp.load_weights, "load_config": load_config}
+    for line in sys.stdin:
+        function, path = json.loads(line)
+        try:
+            loaded = functions[function](path)
+            answer = ("loaded", _digest(loaded) if function == "load_weights" else repr(loaded))
+        except kp.WeightsError as error:
+            answer = ("refused", str(error))
+        except Exception as error:
+            answer = ("failed", repr(error))
+        print(json.dumps(answer), flush=True)
+
+
+def _digest(network: Any) -> str:
+    digest = hashlib.sha256()
+    digest.update(repr((network.hidden_units, network.activation, network.provenance)).encode())
+    for array in network.get_weights():
+        digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+if __name__ == "__main__":
+    main()
