@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
 DATA = TESTS / "data"
-# `pytest -m quick` runs the tests of these rooms: no training over 5 s, no browser, no build.
+# `pytest -m quick` runs the tests of these rooms, and the files of other rooms that are marked
+# `quick`: no training over 5 s, no browser, no build.
 QUICK_ROOMS = ("dqn", "config", "environments", "storage")
 Recorded = dict[str, NDArray[Any]]
 Command = Callable[..., subprocess.CompletedProcess[str]]
@@ -135,6 +137,41 @@ def comparable(result: kp.TrainingResult) -> list[tuple[float, ...]]:
         tuple(-1.0 if np.isnan(value) else value for value in record[:-1])
         for record in result.history
     ]
+
+
+# Runs the module `sys.argv[1]`. When the parent process ends, even by SIGKILL, the system closes
+# its end of the pipe at stdin, and this process ends too.
+_END_WITH_PARENT = """
+import os, runpy, sys, threading
+
+def end_with_parent():
+    os.read(0, 1)
+    os._exit(1)
+
+threading.Thread(target=end_with_parent, daemon=True).start()
+runpy.run_module(sys.argv.pop(1), run_name="__main__", alter_sys=True)
+"""
+
+
+@contextlib.contextmanager
+def running_module(
+    module: str, *words: str | os.PathLike[str], **options: Any
+) -> Iterator[subprocess.Popen[Any]]:
+    """Yields a process of `python -m MODULE WORDS`, and kills it at the end of the `with` block.
+
+    It ends with this process too. `options` are those of `subprocess.Popen`.
+    """
+    reading, writing = os.pipe()
+    arguments = [sys.executable, "-c", _END_WITH_PARENT, module, *map(str, words)]
+    try:
+        with subprocess.Popen(arguments, stdin=reading, **options) as process:
+            try:
+                yield process
+            finally:
+                process.kill()
+    finally:
+        os.close(reading)
+        os.close(writing)
 
 
 def assert_same(ours: kp.TrainingResult, theirs: kp.TrainingResult) -> None:

@@ -210,6 +210,35 @@ def test_tensorboard_shows_curves_and_phase_planes(in_process: Command, tmp_path
     assert not (tmp_path / "run" / "tensorboard").exists()  # no curves of another run
 
 
+def test_folder_without_a_text_as_name_is_used_but_not_by_tensorboard(
+    in_process: Command, tmp_path: Path
+) -> None:
+    out = os.fsdecode(b"runs/\xff")
+    words = ["train", "--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out"]
+    done = in_process(*words, out, "--tensorboard")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(r"error: TensorBoard cannot write in .*udcff.*\n", done.stderr)
+    assert not (tmp_path / "runs").exists()
+    assert in_process(*words, out).returncode == 0
+    film, network = os.fsdecode(b"\xff.gif"), f"{out}/pendulum_weight.h5"
+    done = in_process("evaluate", network, "--episodes", "1", "--gif", film)
+    assert done.returncode == 0, done.stderr
+    assert os.listdir(bytes(tmp_path / "runs")) == [b"\xff"]  # noqa: PTH208
+    assert (tmp_path / film).exists()
+
+
+@pytest.mark.parametrize("out", ["-x", "my run"])
+def test_printed_commands_run(out: str, in_process: Command) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "1", f"--out={out}"]
+    lines = in_process("train", *words).stdout.splitlines()
+    commands = [line.split(": ", 1)[1] for line in lines if ": python -m " in line]
+    assert len(commands) == 3
+    evaluate_words = shlex.split(commands[0])[3:]
+    assert evaluate_words[-1] == "--render"
+    assert in_process("evaluate", *evaluate_words[:-1]).returncode == 0
+    assert [shlex.split(command)[-1] for command in commands[1:]] == [evaluate_words[0]] * 2
+
+
 def test_missing_tensorboard_is_one_error_line(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -266,7 +295,7 @@ def test_pendulum_settings_are_refused_for_cartpole(
         (["evaluate", cartpole_file, "--gravity", "2"], "gravity belongs to Pendulum-v1"),
         (
             ["train", "--init", cartpole_file],
-            "has environment CartPole-v1, the settings say Pendulum-v1",
+            "records the activation relu, not tanh, for CartPole-v1",
         ),
     ):
         done = in_process(*words)
@@ -278,7 +307,7 @@ def test_pendulum_settings_are_refused_for_cartpole(
 
 def test_gif_shows_the_first_episode(command: Command, tmp_path: Path) -> None:
     for _ in range(2):  # the second film replaces the first
-        done = command("evaluate", RECORDED, "--episodes", "1", "--gif", "film.gif")
+        done = command("evaluate", "reference", "--episodes", "1", "--gif", "film.gif")
     assert done.returncode == 0, done.stderr
     with Image.open(tmp_path / "film.gif") as film:
         assert film.size == (250, 250)
@@ -350,7 +379,7 @@ WRONG = [
     (["train", "--out", "n" * 300], "File name too long"),
     (["train", "--init", "missing.h5"], "missing.h5: no such file"),
     (["train", "--init", "text.h5"], "text.h5: not an HDF5 file"),
-    (["train", "--init", RECORDED, "--hidden-units", "8"], "layers 512-256-128-41"),
+    (["train", "--init", RECORDED, "--hidden-units", "8"], "hidden_units (512, 256, 128)"),
     (["train", "--preset", "cartpole-original", "--init", RECORDED], "has environment Pendulum-v1"),
     (["train", "--preset", "cartpole-original", "--gravity", "1"], "gravity 1.0 belongs to"),
     (["train", "--environment", "CartPole-v1"], "gravity 1.0 belongs to Pendulum-v1; CartPole-v1"),
@@ -360,13 +389,13 @@ WRONG = [
     (["evaluate", "missing.h5"], "missing.h5: no such file"),
     (["evaluate", "text.h5"], "text.h5: not an HDF5 file"),
     (["evaluate", "n" * 300], "File name too long"),
-    (["evaluate", RECORDED, "--gif", "text.h5"], "text.h5 holds something else than a GIF"),
-    (["evaluate", RECORDED, "--gif", "n" * 300], "File name too long"),
-    (["evaluate", RECORDED, "--episodes", "0"], "episodes is 0"),
-    (["evaluate", RECORDED, "--seed", "-1"], "seed is -1"),
-    (["evaluate", RECORDED, "--gravity", "nan"], "gravity is nan"),
+    (["evaluate", "reference", "--gif", "text.h5"], "text.h5 holds something else than a GIF"),
+    (["evaluate", "reference", "--gif", "n" * 300], "File name too long"),
+    (["evaluate", "reference", "--episodes", "0"], "episodes is 0"),
+    (["evaluate", "reference", "--seed", "-1"], "seed is -1"),
+    (["evaluate", "reference", "--gravity", "nan"], "gravity is nan"),
     (["train", "--live", "--render"], "not allowed with"),
-    (["evaluate", RECORDED, "--episodes", "1", "--gif", "no/such/folder.gif"], "cannot write"),
+    (["evaluate", "reference", "--episodes", "1", "--gif", "no/such/folder.gif"], "cannot write"),
 ]
 
 

@@ -57,6 +57,11 @@ def test_own_arm_is_a_preset_with_settings() -> None:
     assert (one.baseline, two.baseline, three.baseline) == (None, None, "reference")
 
 
+def test_arm_with_a_name_of_100_letters_is_accepted() -> None:
+    (arm,) = own_arms([], [f"{'n' * 100}: original"])
+    assert arm.slug == "n" * 100
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -17,13 +17,16 @@ from threading import Thread
 
 import psutil
 import pytest
+from conftest import TESTS, running_module
 
 from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.study import dask_workers
 from keras_pendulum.study.dask_workers import cluster_workers, dashboard, local_workers
 from keras_pendulum.study.job import Job, Reply, installed_versions
-from keras_pendulum.study.runner import run_all
+from keras_pendulum.study.runner import lost_scheduler, run_all
+
+IMPORTED_FROM = [str(TESTS), str(Path(__file__).parent)]  # workers unpickle functions of this file
 
 
 @pytest.fixture(autouse=True)
@@ -123,33 +126,30 @@ def test_end_of_local_workers_does_not_wait_for_their_jobs(tmp_path: Path) -> No
     assert not [child for child in remaining if "spawn_main" in " ".join(child.cmdline())]
 
 
-@contextmanager
-def running(*words: str | Path) -> Iterator[subprocess.Popen[bytes]]:
-    with subprocess.Popen(
-        [sys.executable, "-m", *map(str, words)],
+def running(module: str, *words: str | Path) -> AbstractContextManager[subprocess.Popen[bytes]]:
+    folders = [*IMPORTED_FROM, os.environ.get("PYTHONPATH")]
+    return running_module(
+        module,
+        *words,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},  # they unpickle its functions
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))},
+    )
 
 
 @contextmanager
 def running_scheduler(folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
     """Yields a scheduler's process and its address."""
     file = folder / "scheduler.json"
-    words = ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
-    with running(*words, "--no-dashboard", "--scheduler-file", file) as process:
+    words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
+    with running("distributed.cli.dask_scheduler", *words) as process:
         wait_for(lambda: file.exists() and file.read_text().endswith("}"))
         yield process, json.loads(file.read_text())["address"]
 
 
 def running_worker(address: str, threads: int = 1) -> AbstractContextManager[object]:
-    words = ["distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", str(threads)]
-    return running(*words)
+    words = [address, "--no-nanny", "--nthreads", str(threads)]
+    return running("distributed.cli.dask_worker", *words)
 
 
 def refusal(address: str, versions: dict[str, str]) -> str:
@@ -206,3 +206,86 @@ def test_lost_scheduler_is_noticed_while_no_job_finishes(
     )
     assert lines == []
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    "moment", ["_require_one_thread", "_require_same_versions", "the dashboard", "the last run"]
+)
+def test_scheduler_lost_between_two_runs_or_before_the_first_is_one_error(
+    moment: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    versions = installed_versions()
+    with running_scheduler(tmp_path) as (scheduler, address), running_worker(address):
+
+        def stop_scheduler() -> None:
+            scheduler.kill()
+            scheduler.wait()
+
+        if moment.startswith("_"):
+            check = getattr(dask_workers, moment)
+
+            def check_without_scheduler(*arguments: object) -> None:
+                stop_scheduler()
+                check(*arguments)
+
+            monkeypatch.setattr(dask_workers, moment, check_without_scheduler)
+        with pytest.raises(UserError) as caught, cluster_workers(address, versions) as client:
+            if moment == "the dashboard":
+                stop_scheduler()
+                dashboard(client)
+            elif moment == "the last run":
+                assert len(list(run_all(client, describe_worker, [make_job(0)]))) == 1
+                stop_scheduler()
+                client.nthreads()
+    assert str(caught.value) == str(lost_scheduler(address))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_other_error_is_not_reported_as_a_lost_scheduler(tmp_path: Path) -> None:
+    with (
+        running_scheduler(tmp_path) as (_, address),
+        running_worker(address),
+        pytest.raises(ZeroDivisionError),
+        cluster_workers(address, installed_versions()) as client,
+    ):
+        client.run(lambda: 1 / 0)
+
+
+# A test that is killed while it has a scheduler, a worker of it, and a worker of this machine.
+KILLED = """
+import os, signal, sys, time
+from pathlib import Path
+from test_dask_workers import running_scheduler, running_worker
+from keras_pendulum.study.dask_workers import local_workers
+
+with (
+    running_scheduler(Path(sys.argv[1])) as (_, address),
+    running_worker(address),
+    local_workers(1),
+):
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_killed_test_leaves_no_process_behind(tmp_path: Path) -> None:
+    folders = [*IMPORTED_FROM, *sys.path]
+    with subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))},
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as killed:
+        assert killed.stdout is not None
+        assert killed.stdout.readline() == "ready\n"
+        children = psutil.Process(killed.pid).children(recursive=True)
+        killed.kill()
+    assert len(children) >= 3
+    _, alive = psutil.wait_procs(children, 60)
+    left = [child for child in alive if child.status() != psutil.STATUS_ZOMBIE]
+    for child in left:
+        child.kill()
+    assert left == []

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import pytest
 
 from keras_pendulum.config.presets import preset
@@ -9,8 +12,10 @@ from keras_pendulum.errors import UserError
 from keras_pendulum.study import job as job_module
 from keras_pendulum.study.job import (
     Job,
+    RunResult,
     curve_points,
     decode,
+    encode,
     installed_versions,
     train_and_score,
 )
@@ -40,3 +45,94 @@ def test_worker_with_other_versions_refuses_the_run() -> None:
 
 def test_curve_points_are_means_of_ten_episodes_and_of_the_rest() -> None:
     assert curve_points([*range(20), 7.0, 8.0]) == [4.5, 14.5, 7.5]
+
+
+LOWEST = -(math.pi**2 + 6.4 + 0.004)  # reward of a step
+PENDULUM = Job("arm", "arm", preset("reference", episodes=11, max_episode_steps=100), {})
+POLE = Job("pole", "pole", preset("cartpole", episodes=11), {})
+PENDULUM_RESULT = RunResult(-40.0, [-41.5] * 100, [-1.0] * 2, [-100.0] * 2)
+POLE_RESULT = RunResult(500.0, [499.0] * 100, [1.0] * 2, [20.0] * 2)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"optimal_mean_return": 0.0, "returns": [200 * LOWEST] * 100},
+        {"optimal_mean_return": 200 * LOWEST, "returns": [0.0] * 100},
+        {"average_rewards": [LOWEST, 0.0], "episode_returns": [100 * LOWEST, 0.0]},
+    ],
+)
+def test_numbers_at_the_limits_are_valid(changes: dict[str, Any]) -> None:
+    result = PENDULUM_RESULT._replace(**changes)
+    assert decode(encode(PENDULUM, result), PENDULUM) == result
+
+
+def test_cartpole_results_at_the_limits_are_valid() -> None:
+    result = RunResult(500.0, [500.0] * 99 + [0.0], [1.0] * 2, [500.0, 0.0])
+    assert decode(encode(POLE, result), POLE) == result
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"optimal_mean_return": 0.001},
+        {"optimal_mean_return": 200 * LOWEST - 0.001},
+        {"optimal_mean_return": math.nan},
+        {"optimal_mean_return": "−40"},
+        {"returns": [-41.5] * 99},
+        {"returns": [-41.5] * 101},
+        {"returns": [-41.5] * 99 + [0.001]},
+        {"returns": [-41.5] * 99 + [200 * LOWEST - 0.001]},
+        {"returns": [-41.5] * 99 + [math.nan]},
+        {"returns": [-41.5] * 99 + [-math.inf]},
+        {"returns": [-41.5] * 99 + [False]},
+        {"average_rewards": [-1.0]},
+        {"average_rewards": [-1.0, LOWEST - 0.001]},
+        {"average_rewards": [-1.0, 0.001]},
+        {"average_rewards": [-1.0, None]},
+        {"episode_returns": [-1.0] * 3},
+        {"episode_returns": [-1.0, 100 * LOWEST - 0.001]},
+        {"episode_returns": [-1.0, 0.001]},
+    ],
+    ids=str,
+)
+def test_numbers_that_no_run_can_have_are_refused_despite_their_checksum(
+    changes: dict[str, Any],
+) -> None:
+    assert decode(encode(PENDULUM, PENDULUM_RESULT), PENDULUM) == PENDULUM_RESULT
+    content = {
+        **job_module._settings(PENDULUM),
+        **PENDULUM_RESULT._asdict(),
+        "regret": PENDULUM_RESULT.regret,
+        **changes,
+    }
+    if isinstance(content["optimal_mean_return"], float) and None not in content["returns"]:
+        regret = content["optimal_mean_return"] - sum(content["returns"]) / len(content["returns"])
+        content["regret"] = regret
+    assert decode(job_module._with_checksum(content), PENDULUM) is None
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"returns": [499.0] * 99 + [500.001]},
+        {"returns": [499.0] * 99 + [-0.001]},
+        {"average_rewards": [1.0, 1.001]},
+        {"episode_returns": [20.0, 500.001]},
+    ],
+    ids=str,
+)
+def test_cartpole_results_beyond_the_limits_are_refused(changes: dict[str, Any]) -> None:
+    assert decode(encode(POLE, POLE_RESULT), POLE) == POLE_RESULT
+    assert decode(encode(POLE, POLE_RESULT._replace(**changes)), POLE) is None
+
+
+@pytest.mark.parametrize("changes", [{"returns": []}, {"regret": 1.0}, {"regret": None}], ids=str)
+def test_result_without_returns_or_with_another_regret_is_refused(changes: dict[str, Any]) -> None:
+    content = {
+        **job_module._settings(PENDULUM),
+        **PENDULUM_RESULT._asdict(),
+        "regret": PENDULUM_RESULT.regret,
+    }
+    assert decode(job_module._with_checksum(content), PENDULUM) == PENDULUM_RESULT
+    assert decode(job_module._with_checksum({**content, **changes}), PENDULUM) is None

@@ -3,20 +3,32 @@
 from __future__ import annotations
 
 import csv
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 
+from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.study.arms import own_arms
-from keras_pendulum.study.job import Job, Reply, RunResult, encode
+from keras_pendulum.study.job import (
+    Job,
+    Reply,
+    RunResult,
+    _with_checksum,
+    curve_points,
+    encode,
+)
 from keras_pendulum.study.results_folder import ResultsFolder
 
 
 def reply(job: Job) -> Reply:
     """Returns a reply without training."""
-    return Reply(encode(job, RunResult(0.0, [-1.5], [-0.1], [-1.5])), 1.0, 2.0, 4.0, "host:7")
+    points = len(curve_points([0.0] * job.config.episodes))
+    sign = -1.0 if TASKS[job.config.environment].has_torque else 1.0
+    result = RunResult(0.0, [1.5 * sign] * 100, [0.1 * sign] * points, [1.5 * sign] * points)
+    return Reply(encode(job, result), 1.0, 2.0, 4.0, "host:7")
 
 
 def result_files(folder: Path) -> list[Path]:
@@ -56,6 +68,83 @@ def test_results_of_other_versions_are_missing(tmp_path: Path) -> None:
     assert folder.missing_jobs() == []
     folder.versions = {**folder.versions, "keras": "2.0"}
     assert len(folder.missing_jobs()) == 2
+
+
+def test_folder_for_the_results_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
+    folder = ResultsFolder(tmp_path / "study", own_arms(["reference"], []), 2)
+    with folder.create_and_lock():
+        pass
+    shutil.rmtree(tmp_path / "study" / "results")
+    (tmp_path / "study" / "results").write_text("not a folder")
+    with (
+        pytest.raises(UserError, match=r"^cannot write in .*study: (Not a directory|File exists)"),
+        folder.create_and_lock(),
+    ):
+        raise AssertionError("a run started")
+
+
+def folder_without_manifest(path: Path, seeds: int = 2) -> ResultsFolder:
+    """Returns a folder with all results of a study, whose `study.json` is lost."""
+    folder = ResultsFolder(path, own_arms(["reference", "cartpole"], []), seeds)
+    with folder.create_and_lock():
+        for job in folder.jobs():
+            folder.save(job, reply(job))
+    (path / "study.json").unlink()
+    return folder
+
+
+@pytest.mark.parametrize("seeds", [1, 2, 3])
+def test_results_without_manifest_are_used_by_the_same_study(seeds: int, tmp_path: Path) -> None:
+    folder_without_manifest(tmp_path)
+    folder = ResultsFolder(tmp_path, own_arms(["reference", "cartpole"], []), seeds)
+    folder.require_usable()
+    with folder.create_and_lock():
+        assert len(folder.missing_jobs()) == 2 * max(0, seeds - 2)
+    assert (tmp_path / "study.json").exists()
+
+
+@pytest.mark.parametrize("change", ["other arms", "other settings", "damage", "other name"])
+def test_results_without_manifest_are_refused_by_name_in_another_study(
+    change: str, tmp_path: Path
+) -> None:
+    folder_without_manifest(tmp_path)
+    own = [["reference", "cartpole"], []]
+    first = "cartpole/cartpole-seed0.json"
+    if change == "other arms":
+        own = [["reference"], []]
+    elif change == "other settings":
+        own = [["cartpole"], ["reference: reference tau=0.5"]]
+        first = "reference/reference-seed0.json"
+    elif change == "damage":
+        file = tmp_path / "results" / first
+        file.write_bytes(file.read_bytes()[:-9])
+    else:
+        first = "reference/reference-seed01.json"
+        file = tmp_path / "results" / first
+        file.with_name("reference-seed1.json").rename(file)
+    folder = ResultsFolder(tmp_path, own_arms(*own), 2)
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*.*")}
+    with pytest.raises(UserError) as caught, folder.create_and_lock():
+        pass
+    assert f"{first} is no result of this study, and study.json is missing: run" in str(
+        caught.value
+    )
+    assert {file: file.read_bytes() for file in tmp_path.rglob("*.*")} == before
+
+
+def test_invalid_results_are_missing_and_reported_by_name(tmp_path: Path) -> None:
+    folder = ResultsFolder(tmp_path, own_arms(["reference"], []), 3)
+    lines: list[str] = []
+    with folder.create_and_lock():
+        first, second, _ = folder.jobs()
+        folder.save(first, reply(first))
+        folder.save(second, reply(second))
+        edited = tmp_path / "results" / "reference" / "reference-seed1.json"
+        content = json.loads(edited.read_bytes())["result"]
+        edited.write_bytes(_with_checksum({**content, "returns": []}))
+        assert [job.config.seed for job in folder.missing_jobs(lines.append)] == [1, 2]
+        assert len(folder.results()["reference"]) == 1
+    assert lines == [f"{edited} is damaged or was changed: its run is made again"]
 
 
 def test_folder_in_use_is_refused(tmp_path: Path) -> None:

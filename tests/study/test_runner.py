@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +17,7 @@ from keras_pendulum.errors import UserError
 from keras_pendulum.study import __main__ as study_command
 from keras_pendulum.study import dask_workers
 from keras_pendulum.study import job as job_module
-from keras_pendulum.study.job import Job, Reply, RunResult, encode
+from keras_pendulum.study.job import Job, Reply, RunResult, curve_points, encode
 from keras_pendulum.study.runner import run_all
 
 
@@ -36,7 +38,9 @@ def make_job(seed: int) -> Job:
 
 def reply(job: Job) -> Reply:
     """Returns a reply without training."""
-    return Reply(encode(job, RunResult(0.0, [-1.5], [-0.1], [-1.5])), 1.0, 2.0, 4.0, "host:7")
+    points = len(curve_points([0.0] * job.config.episodes))
+    result = RunResult(0.0, [-1.5] * 100, [-0.1] * points, [-1.5] * points)
+    return Reply(encode(job, result), 1.0, 2.0, 4.0, "host:7")
 
 
 def flaky_work(
@@ -108,6 +112,16 @@ def test_each_worker_has_one_job_at_a_time(client: Client) -> None:
     assert len(list(runs)) == 49
 
 
+def use_workers_of(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Makes the command `study` use the worker of this process."""
+
+    @contextmanager
+    def local_workers(count: int) -> Iterator[Client]:
+        yield client
+
+    monkeypatch.setattr(dask_workers, "local_workers", local_workers)
+
+
 def test_failed_runs_are_reported_and_the_next_study_retries_them(
     client: Client,
     tmp_path: Path,
@@ -119,11 +133,7 @@ def test_failed_runs_are_reported_and_the_next_study_retries_them(
             raise UserError("the loss is nan")
         return reply(job)
 
-    @contextmanager
-    def local_workers(count: int) -> Iterator[Client]:
-        yield client
-
-    monkeypatch.setattr(dask_workers, "local_workers", local_workers)
+    use_workers_of(client, monkeypatch)
     monkeypatch.setattr(job_module, "train_and_score", diverge)
     words = ["--arm", "small: reference", "--arm", "starved: original", "--seeds", "2"]
     words += ["--out", str(tmp_path / "study")]
@@ -148,3 +158,57 @@ def test_failed_runs_are_reported_and_the_next_study_retries_them(
         "3 of 4 runs are already finished\nstarved, seed 0: regret 1.50, "
     )
     assert ", 4/4, 0:00 left\n" in printed.out
+
+
+@pytest.mark.parametrize("obstacle", ["the folder", "its results"])
+def test_study_whose_folder_cannot_be_made_ends_before_its_first_run(
+    obstacle: str,
+    client: Client,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    use_workers_of(client, monkeypatch)
+    monkeypatch.setattr(job_module, "train_and_score", reply)
+    folder = Path("/proc/nowhere") if obstacle == "the folder" else tmp_path / "study"
+    words = ["--presets", "reference", "--seeds", "1", "--out", str(folder)]
+    if obstacle == "its results":
+        assert study_command.main(words) == 0
+        shutil.rmtree(folder / "results")
+        (folder / "results").touch()
+        capsys.readouterr()
+    runs: list[Job] = []
+    monkeypatch.setattr(job_module, "train_and_score", runs.append)
+    assert study_command.main(words) == 2
+    printed = capsys.readouterr()
+    assert re.fullmatch(r"error: cannot .*(nowhere|study).*: .*\n", printed.err)
+    assert (printed.out, runs) == ("", [])
+
+
+def test_lost_manifest_is_written_again_and_an_edited_result_is_made_again(
+    client: Client,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    use_workers_of(client, monkeypatch)
+    monkeypatch.setattr(job_module, "train_and_score", reply)
+    folder = tmp_path / "study"
+    words = ["--presets", "reference", "--seeds", "2", "--out", str(folder)]
+    assert study_command.main(words) == 0
+    manifest = (folder / "study.json").read_bytes()
+    (folder / "study.json").unlink()
+    capsys.readouterr()
+    assert study_command.main(words) == 0
+    assert capsys.readouterr().out.startswith("2 of 2 runs are already finished\n\n")
+    assert (folder / "study.json").read_bytes() == manifest
+
+    edited = folder / "results" / "reference" / "reference-seed1.json"
+    before = edited.read_bytes()
+    content = json.loads(before)["result"]
+    edited.write_bytes(job_module._with_checksum({**content, "returns": []}))
+    assert study_command.main(words) == 0
+    printed = capsys.readouterr()
+    assert printed.err == f"{edited} is damaged or was changed: its run is made again\n"
+    assert printed.out.startswith("1 of 2 runs are already finished\nreference, seed 1: ")
+    assert edited.read_bytes() == before

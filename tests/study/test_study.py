@@ -10,13 +10,13 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 import psutil
 import pytest
-from conftest import Command, command_line, without_gpu_note
+from conftest import Command, command_line, running_module, without_gpu_note
 
 import keras_pendulum as kp
 from keras_pendulum.config.presets import preset
@@ -30,6 +30,7 @@ ARMS = [
     "--arm",
     "starved: original hidden_units=8 episodes=43",
 ]
+STUDY = "keras_pendulum.study"
 NAMES = {
     f"{arm}/{arm}-seed{seed}.json": (arm, seed) for arm in ("small", "starved") for seed in (0, 1)
 }
@@ -55,20 +56,17 @@ def wait_for(condition: Callable[[], object]) -> None:
         time.sleep(0.02)
 
 
-@contextmanager
-def running(*words: str | Path, own_group: bool = False) -> Iterator[subprocess.Popen[str]]:
-    """Yields a process, and kills it at the end of the `with` block."""
-    with subprocess.Popen(
-        [str(word) for word in words],
+def running(
+    module: str, *words: str | Path, own_group: bool = False
+) -> AbstractContextManager[subprocess.Popen[str]]:
+    return running_module(
+        module,
+        *words,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         start_new_session=own_group,
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
+    )
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +76,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     It checks that the workers of the killed study end, too.
     """
     folder = tmp_path_factory.mktemp("study") / "local"
-    words = command_line("study", *ARMS, "--seeds", "2", "--workers", "1", "--out", str(folder))
-    with running(*words) as process:
+    words = [*ARMS, "--seeds", "2", "--workers", "1", "--out", str(folder)]
+    with running(STUDY, *words) as process:
         wait_for(lambda: result_files(folder))
         workers = workers_of(process)
         assert len(workers) == 1
@@ -90,7 +88,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         assert "Traceback" not in output
     before = result_files(folder)
     assert 1 <= len(before) < len(NAMES)
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    done = subprocess.run(command_line("study", *words), capture_output=True, text=True, check=True)
     assert f"{len(before)} of 4 runs are already finished" in done.stdout
     assert f"{len(NAMES) - len(before)} runs in " in done.stdout
     assert without_gpu_note(done.stderr) == ""
@@ -170,8 +168,8 @@ def test_complete_study_starts_no_workers(
 
 def test_run_of_a_killed_worker_is_repeated(finished: Path, tmp_path: Path) -> None:
     folder = tmp_path / "study"
-    words = command_line("study", *ARMS, "--seeds", "2", "--workers", "1", "--out", str(folder))
-    with running(*words) as process:
+    words = [*ARMS, "--seeds", "2", "--workers", "1", "--out", str(folder)]
+    with running(STUDY, *words) as process:
         wait_for(lambda: result_files(folder))
         (worker,) = workers_of(process)
         worker.kill()
@@ -196,7 +194,7 @@ def problem_lines(output: str) -> int:
 def test_control_c_stops_at_once_and_says_how_to_continue(seconds: float, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     words = ["--arm", "long: reference episodes=100000", "--seeds", "8", "--out", str(folder)]
-    with running(*command_line("study", *words, "--workers", "8"), own_group=True) as process:
+    with running(STUDY, *words, "--workers", "8", own_group=True) as process:
         wait_for(lambda: workers_of(process))
         time.sleep(seconds)
         workers = workers_of(process)
@@ -211,15 +209,15 @@ def test_control_c_stops_at_once_and_says_how_to_continue(seconds: float, tmp_pa
 
 
 def test_cluster_that_loses_a_worker_gives_the_same_bytes(finished: Path, tmp_path: Path) -> None:
-    python, file = sys.executable, tmp_path / "scheduler.json"
+    file = tmp_path / "scheduler.json"
     place = ["--scheduler-file", str(file), "--no-dashboard"]
-    server = [python, "-m", "distributed.cli.dask_scheduler", *place, "--host", "127.0.0.1"]
-    worker = [python, "-m", "distributed.cli.dask_worker", *place, "--no-nanny", "--nthreads", "1"]
+    server = ["distributed.cli.dask_scheduler", *place, "--host", "127.0.0.1"]
+    worker = ["distributed.cli.dask_worker", *place, "--no-nanny", "--nthreads", "1"]
     folder, longer = tmp_path / "study", tmp_path / "longer"
     with running(*server, "--port", "0") as scheduler:
         wait_for(lambda: file.exists() and file.read_text().endswith("}"))
         address = json.loads(file.read_text())["address"]
-        words = [*command_line("study", *ARMS), "--scheduler", address, "--seeds"]
+        words = [STUDY, *ARMS, "--scheduler", address, "--seeds"]
         with running(*worker) as first, running(*worker):
             with running(*words, "2", "--out", folder) as process:
                 wait_for(lambda: result_files(folder))
