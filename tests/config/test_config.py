@@ -157,9 +157,42 @@ def test_checkpoint_too_large_to_load_is_refused() -> None:
     assert kp.preset("reference", hidden_units=(8192, 6000)).hidden_units == (8192, 6000)
 
 
-def test_1_and_16_hidden_layers_are_accepted() -> None:
-    for count in (1, 16):
-        assert len(kp.preset("reference", hidden_units=(8,) * count).hidden_units) == count
+def test_largest_checkpoint_is_accepted_and_a_larger_one_is_refused() -> None:
+    # 49 436 809 weights in 4 copies, 33 bytes for each transition and 64 for each episode are
+    # 1 GiB - 1 MiB, which leaves 1 MiB for the rest of the file.
+    assert 16 * 49_436_809 + 33 * 8_535_792 + 64 * 362 == 1_073_741_824 - 1_048_576
+    largest = kp.preset(
+        "reference", hidden_units=(8192, 6000), replay_capacity=8_535_792, episodes=362
+    )
+    larger: list[dict[str, Any]] = [
+        {"replay_capacity": 8_535_793},
+        {"episodes": 363},
+        {"torque_count": 42},
+        {"optimizer": "adamw"},
+    ]
+    for changes in larger:
+        with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
+            dataclasses.replace(largest, **changes)
+
+
+def test_largest_checkpoint_of_cartpole_has_41_bytes_for_each_transition() -> None:
+    # 49 210 962 weights in 5 copies.
+    assert 20 * 49_210_962 + 41 * 2_157_848 + 64 * 35 == 1_073_741_824 - 1_048_576
+    largest = kp.preset(
+        "cartpole", hidden_units=(8192, 6000), replay_capacity=2_157_848, episodes=35
+    )
+    with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
+        dataclasses.replace(largest, replay_capacity=2_157_849)
+
+
+def test_1_and_16_hidden_layers_of_1_to_8192_units_are_accepted() -> None:
+    accepted: list[tuple[int, ...]] = [(1,), (8192,), (8,) * 16]
+    for units in accepted:
+        assert kp.preset("reference", hidden_units=units).hidden_units == units
+    refused: list[tuple[int, ...]] = [(), (0,), (8193,), (8,) * 17]
+    for units in refused:
+        with pytest.raises(kp.ConfigError, match=r"^hidden_units is .*; expected "):
+            kp.preset("reference", hidden_units=units)
 
 
 def assert_largest_batch(config: Config, stored: int) -> None:

@@ -50,10 +50,36 @@ def test_reference_is_the_default_and_has_no_defect() -> None:
     assert Config().train_frequency == "episode"
 
 
-def test_swingup_is_the_reference_on_the_standard_task() -> None:
+def test_reference_has_its_numbers() -> None:
+    config = kp.preset("reference")
+    assert (config.environment, config.gravity) == ("Pendulum-v1", 1.0)
+    assert (config.episodes, config.max_episode_steps, config.seed) == (500, 200, 0)
+    assert (config.hidden_units, config.activation) == ((512, 256, 128), "tanh")
+    assert (config.initial_weights, config.torque_count) == ("glorot", 41)
+    assert (config.replay_capacity, config.batch_size) == (25_000, 32)
+    assert (config.discount, config.reward_scale, config.double_q) == (0.9, 1.0, False)
+    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.99, 0.01)
+    assert (config.warmup_episodes, config.updates_per_episode) == (41, 30)
+    assert (config.optimizer, config.optimizer_epsilon, config.loss) == ("adam", 1e-7, "squared")
+    assert (config.weight_decay, config.gradient_clip) == (0.0, None)
+    assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "cosine")
+    assert (config.target_update, config.tau, config.save_every) == ("soft", 0.1, 10)
+
+
+def test_swingup_has_the_numbers_of_the_standard_task() -> None:
     config = kp.preset("swingup")
-    assert (config.gravity, config.double_q, config.discount) == (10.0, False, 0.98)
-    assert (config.hidden_units, config.torque_count) == ((512, 256, 128), 41)
+    assert (config.environment, config.gravity) == ("Pendulum-v1", 10.0)
+    assert (config.episodes, config.max_episode_steps) == (1700, 60)
+    assert (config.hidden_units, config.activation) == ((512, 256, 128), "tanh")
+    assert (config.torque_count, config.stored_index) == (41, "exact")
+    assert (config.replay_capacity, config.batch_size) == (25_000, 64)
+    assert (config.discount, config.reward_scale, config.double_q) == (0.98, 0.02, False)
+    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.997, 0.01)
+    assert (config.warmup_episodes, config.updates_per_episode) == (41, 30)
+    assert (config.train_frequency, config.total_updates) == ("episode", 49_770)
+    assert (config.optimizer, config.optimizer_epsilon, config.loss) == ("adam", 1e-7, "squared")
+    assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "cosine")
+    assert (config.target_update, config.tau) == ("soft", 0.1)
 
 
 def test_cartpole_original_has_the_numbers_of_the_notebooks() -> None:
@@ -68,6 +94,19 @@ def test_cartpole_original_has_the_numbers_of_the_notebooks() -> None:
     assert (config.epsilon_start, config.epsilon_min) == (0.9, 0.05)
     assert (config.train_frequency, config.learning_rate_schedule) == ("step", "constant")
     assert (config.target_update, config.tau) == ("soft", 0.005)
+
+
+def test_cartpole_has_its_tuned_numbers() -> None:
+    config = kp.preset("cartpole")
+    assert (config.episodes, config.max_episode_steps) == (800, 500)
+    assert (config.replay_capacity, config.batch_size, config.discount) == (400_000, 128, 0.99)
+    assert (config.reward_scale, config.double_q) == (0.01, True)
+    assert (config.epsilon_schedule, config.epsilon_decay) == ("episodes", 0.98)
+    assert (config.epsilon_start, config.epsilon_min) == (0.9, 0.05)
+    assert (config.train_frequency, config.updates_per_episode) == ("episode", 120)
+    assert (config.optimizer, config.weight_decay, config.gradient_clip) == ("adamw", 0.05, 100)
+    assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "cosine")
+    assert (config.target_update, config.tau) == ("soft", 0.02)
 
 
 def test_cartpole_has_the_network_and_the_optimizer_of_the_notebooks() -> None:

@@ -37,7 +37,7 @@ def test_torque_between_two_of_the_grid_gets_the_nearer_index() -> None:
     assert grid.nearest_index(-1.94) == 1
 
 
-@pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 2.001])
+@pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 2.001, 2 + 2**-51])
 def test_torque_out_of_range_is_refused(torque: float) -> None:
     for refuse in (TorqueGrid(41).nearest_index, require_torque):
         with pytest.raises(ValueError, match=f"torque {torque} N·m; expected a number from -2 to"):

@@ -196,7 +196,26 @@ def test_tables_of_shorter_episodes_are_finer_in_the_same_memory(
     assert requested_cells == [cells]
 
 
-@pytest.mark.parametrize("gravity", [-0.1, 100.5, np.nan, np.inf, "heavy", None])
+def test_gravities_steps_and_seeds_at_their_limits_are_accepted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[tuple[float, int, int]] = []
+
+    def record(gravity: float, starts: Array, steps: int) -> Array:
+        calls.append((gravity, len(starts), steps))
+        return np.full(len(starts), -7.0)
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(module, "best_return", record)
+    for gravity in (0.0, 100.0):
+        for steps in (1, 200):
+            assert optimal_return(gravity, [0, 2**32 - 1], steps).tolist() == [-7.0, -7.0]
+    assert calls == [(gravity, 1001, steps) for gravity in (0, 100) for steps in (1, 200)]
+
+
+@pytest.mark.parametrize(
+    "gravity", [-0.1, -5e-324, 100.00000000000001, 100.5, np.nan, np.inf, "heavy", None]
+)
 def test_wrong_gravity_is_refused_in_one_line(gravity: Any) -> None:
     with pytest.raises(ValueError, match=r"gravity is .*; expected a number from 0 to 100") as info:
         optimal_return(gravity)
@@ -213,6 +232,10 @@ def test_wrong_seed_is_refused(seed: int) -> None:
 def test_wrong_number_of_steps_is_refused(steps: int) -> None:
     with pytest.raises(ValueError, match=f"steps is {steps}; expected 1 to 200"):
         optimal_return(1.0, [0], steps)
+
+
+def test_default_is_100_starts_of_200_steps_at_gravity_1() -> None:
+    np.testing.assert_array_equal(optimal_return(), optimal_return(1.0, range(100), 200))
 
 
 def test_seeds_are_accepted_in_any_order_repeated_and_empty(

@@ -33,7 +33,9 @@ def test_command_writes_the_files_of_the_package(
     assert optimum_command.main(["-3", "--out", str(tmp_path)]) == 2
     assert optimum_command.main(["1", "--steps", "0", "--out", str(tmp_path)]) == 2
     assert starts_of_calls == [10_000] * 3
-    capsys.readouterr()
+    with pytest.raises(SystemExit, match="2"):
+        optimum_command.main(["1"])
+    assert capsys.readouterr().err.endswith("the following arguments are required: --out\n")
     assert optimum_command.main(["1", "--out", str(tmp_path / "missing")]) == 2
     error = capsys.readouterr().err
     assert error.startswith("error: cannot write ")

@@ -8,7 +8,9 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.optimum import phase_plane
 from keras_pendulum.optimum.phase_plane import (
+    EXTENT,
     POINTS,
     network_phase_plane,
     optimal_phase_plane,
@@ -35,6 +37,26 @@ def test_optimum_for_discount_0_is_no_torque_and_the_next_reward() -> None:
     assert (plane.torque == 0).all()
     angle = np.abs(THETA)  # π and -π are the same angle
     np.testing.assert_allclose(plane.value, -(angle**2) - 0.1 * SPEED[:, None] ** 2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("discount", "horizon"), [(0.0, 200), (0.5, 10), (0.9, 66), (0.98, 200), (1.0, 200)]
+)
+def test_optimum_counts_the_steps_whose_discount_factor_is_above_a_thousandth(
+    discount: float, horizon: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def record(gravity: float, steps: int, cells: int, gamma: float) -> Any:
+        horizons.append(steps)
+        return np.zeros((3201, cells + 1), np.float32)
+
+    horizons: list[int] = []
+    monkeypatch.setattr(phase_plane, "solve", record)
+    optimal_phase_plane(1.0, discount)
+    assert horizons == [horizon]
+
+
+def test_extent_is_a_whole_turn_and_the_speed_limit() -> None:
+    assert (-math.pi, math.pi, -8, 8) == EXTENT
 
 
 @pytest.mark.parametrize(("gravity", "discount"), [(1.0, 0.9), (10.0, 0.98)])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from keras_pendulum.optimum import return_cache
 from keras_pendulum.optimum.optimal_return import optimal_return
 
+pytestmark = pytest.mark.quick
 Array = NDArray[np.float64]
 
 
@@ -80,6 +81,31 @@ def test_valid_cache_is_used(cache: Path, computed: list[int]) -> None:
     assert not computed
 
 
+# -(π² + 0.1·8² + 0.001·2²) for each step: hanging down at full speed with the full torque.
+LOWEST = {1: -16.2736044, 60: -976.416264, 200: -3254.72088}  # by steps
+
+
+@pytest.mark.parametrize("steps", LOWEST)
+@pytest.mark.parametrize(
+    ("share", "plausible"), [(1 - 1e-8, True), (1 + 1e-8, False), (0, True), (-1e-300, False)]
+)
+def test_returns_between_the_lowest_possible_one_and_0_are_plausible(
+    steps: int, share: float, plausible: bool, tmp_path: Path
+) -> None:
+    path, value = tmp_path / "a.npz", share * LOWEST[steps]
+    for returns in ({0: value}, {0: -1.0, 1: value, 2: -2.0}):
+        return_cache.write(path, 1.0, steps, returns)
+        assert return_cache.read(path, 1.0, steps) == (returns if plausible else {})
+
+
+def test_bounds_of_plausible_returns_are_plausible_themselves(tmp_path: Path) -> None:
+    path, lowest = tmp_path / "a.npz", 200 * return_cache.LOWEST_REWARD
+    return_cache.write(path, 1.0, 200, {0: lowest, 1: 0.0})
+    assert return_cache.read(path, 1.0, 200) == {0: lowest, 1: 0.0}
+    return_cache.write(path, 1.0, 200, {0: float(np.nextafter(lowest, -np.inf))})
+    assert return_cache.read(path, 1.0, 200) == {}
+
+
 @pytest.mark.parametrize(
     "content",
     [
@@ -115,6 +141,20 @@ def test_damaged_or_foreign_cache_is_computed_again_and_replaced(
     np.testing.assert_array_equal(optimal_return(9.81, range(5)), returns)
     assert computed == [1000]
     assert [path.name for path in cache.iterdir()] == ["gravity_9.81.npz"]
+
+
+class MakesAFile:
+    """An object whose unpickling makes the file `made`."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (Path("made"),)
+
+
+def test_nothing_in_a_cache_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.npz").write_bytes(archive(returns=np.array([MakesAFile()])))
+    assert return_cache.read(Path("a.npz"), 9.81, 200) == {}
+    assert not Path("made").exists()
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,13 @@ def test_solve_returns_the_table_of_the_horizon() -> None:
     np.testing.assert_array_equal(solve(10.0, horizon=9, theta_cells=100), coarse_tables()[9])
 
 
+def test_value_at_the_corners_of_the_grid_is_that_of_the_table() -> None:
+    table = np.random.RandomState(0).rand(3201, 11).astype(np.float32)
+    theta = np.array([-np.pi, -np.pi, -1e-12, -1e-12])
+    value = value_at(table, theta, np.array([-8.0, 8.0, -8.0, 8.0]))
+    np.testing.assert_allclose(value, table[[0, -1, 0, -1], [0, 0, -1, -1]], atol=1e-6)
+
+
 def test_greedy_return_equals_gymnasiums() -> None:
     env = pendulum(10.0)
     for seed in range(3):

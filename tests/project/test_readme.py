@@ -19,7 +19,6 @@ import keras_pendulum as kp
 from benchmarks.choosing import ARMS
 from benchmarks.departures import BEFORE, departures, measured
 from benchmarks.report import RESULTS
-from keras_pendulum.storage.keras_h5 import decode
 
 PACKAGE = Path(kp.__file__).parent
 
@@ -179,7 +178,7 @@ def test_shipped_policy_has_the_return_that_its_file_records(name: str) -> None:
     with h5py.File(path) as file:
         attributes = file["keras_pendulum"].attrs.items()
         recorded = {
-            key: decode(value) if isinstance(value, bytes) else value for key, value in attributes
+            key: value.decode() if isinstance(value, bytes) else value for key, value in attributes
         }
     network = kp.load_weights(path)
     assert recorded["preset"] == json.loads(recorded["config"])["preset"] == name

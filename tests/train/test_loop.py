@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pytest
 from gymnasium.wrappers import TimeLimit
+from numpy.typing import NDArray
 
 import keras_pendulum as kp
 from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import Run, make_run
+
+pytestmark = pytest.mark.quick
 
 
 def trained(name: str, **changes: Any) -> Run:
@@ -33,6 +37,86 @@ def updates(run: Run) -> list[int]:
 def stored(run: Run) -> Transitions:
     """Returns the transitions in the replay buffer, oldest first."""
     return Transitions(**run.replay.get_state())
+
+
+@dataclass
+class ScriptedRun:
+    """A run of episodes with given ends, whose updates return losses without computing.
+
+    Args:
+        ends: one letter for each step: "." for a step inside an episode, "T" for one that
+            terminates it, "t" for one that truncates it. A further step raises an error.
+        settings: changes to the preset `original`.
+        losses: of the updates, in order; further ones are 1.
+    """
+
+    ends: str
+    settings: dict[str, Any]
+    losses: list[float] = field(default_factory=list)
+    reset_seeds: list[int | None] = field(default_factory=list)
+    batch_shapes: list[tuple[int, ...]] = field(default_factory=list)  # [K, B] of each update
+
+    def train(self) -> list[EpisodeRecord]:
+        run = make_run(kp.preset("original", hidden_units=(4,), **self.settings))
+        ends, losses = iter(self.ends), itertools.chain(self.losses, itertools.repeat(1.0))
+
+        def reset(seed: int | None) -> tuple[NDArray[np.float32], dict[str, Any]]:
+            self.reset_seeds.append(seed)
+            return np.zeros(3, np.float32), {}
+
+        def step(action: Any) -> tuple[Any, ...]:
+            end = next(ends, "no further step")
+            assert end in ".Tt"
+            return np.zeros(3, np.float32), -1.0, end == "T", end == "t", {}
+
+        def update(batches: Transitions) -> NDArray[np.float32]:
+            self.batch_shapes.append(batches.action.shape)
+            count = len(batches.action)
+            return np.fromiter(itertools.islice(losses, count), np.float32, count)
+
+        run.env.reset, run.env.step = reset, step  # type: ignore[method-assign, assignment]
+        run.agent.update = update  # type: ignore[method-assign]
+        return list(train_episodes(run))
+
+
+def test_terminated_and_truncated_steps_end_an_episode() -> None:
+    run = ScriptedRun("..T.tt", {"episodes": 3})
+    records = run.train()
+    assert [record.environment_steps for record in records] == [3, 5, 6]
+    assert [record.average_reward for record in records] == [-1.0] * 3
+
+
+def test_seed_is_given_to_the_first_reset_only() -> None:
+    run = ScriptedRun("ttt", {"episodes": 3, "seed": 5})
+    run.train()
+    assert run.reset_seeds == [5, None, None]
+
+
+def test_train_frequency_episode_updates_after_each_episode_from_the_warmup_on() -> None:
+    settings = {"episodes": 4, "warmup_episodes": 2, "updates_per_episode": 3, "batch_size": 2}
+    run = ScriptedRun("t.t..tt", settings, losses=[1, 2, 6, 5, 5, 2])
+    records = run.train()
+    assert run.batch_shapes == [(3, 2), (3, 2)]
+    assert [record.updates for record in records] == [0, 0, 3, 6]
+    assert [record.loss for record in records[2:]] == [3, 4]
+    assert all(math.isnan(record.loss) for record in records[:2])
+
+
+def test_train_frequency_step_updates_after_each_step_from_the_first_full_batch() -> None:
+    # warmup_episodes and updates_per_episode belong to train_frequency episode.
+    settings = {"episodes": 3, "train_frequency": "step", "batch_size": 3, "warmup_episodes": 0}
+    run = ScriptedRun(".t.t.t", {**settings, "updates_per_episode": 7})
+    records = run.train()
+    assert run.batch_shapes == [(1, 3)] * 4
+    assert [record.updates for record in records] == [0, 2, 4]
+
+
+@pytest.mark.parametrize("loss", [math.inf, -math.inf, math.nan])
+def test_loss_that_is_not_finite_is_refused_after_finite_ones(loss: float) -> None:
+    settings = {"episodes": 2, "warmup_episodes": 0, "updates_per_episode": 2, "batch_size": 2}
+    run = ScriptedRun(".t.t", settings, losses=[1, 1, 1, loss])
+    with pytest.raises(kp.UserError, match=f"^episode 1, step 2: the loss is {loss}, learning"):
+        run.train()
 
 
 def test_original_makes_459_updates_in_500_episodes() -> None:

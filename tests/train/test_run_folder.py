@@ -78,7 +78,7 @@ def full_disk(descriptor: int) -> None:
 
 
 def fill_disk_after(files: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    remaining = iter(range(files))
+    remaining = iter(range(2 * files))  # each file, and its folder
     fsync = os.fsync
     monkeypatch.setattr(
         "keras_pendulum.storage.atomic_write.os.fsync",
@@ -135,6 +135,78 @@ def test_run_of_another_environment_is_removed_only_after_the_first_new_checkpoi
     kp.train_dqn(cartpole, tmp_path, overwrite=True)
     assert not (tmp_path / "pendulum_weight.h5").exists()
     assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
+
+
+@pytest.mark.parametrize("name", ["pendulum_weight.h5", "cartpole_weight.h5", "history.csv"])
+def test_run_does_not_write_through_a_link(name: str, tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path / "run")
+    target = tmp_path / "of another run"
+    target.write_bytes(b"unchanged")
+    (tmp_path / "run" / name).unlink(missing_ok=True)
+    (tmp_path / "run" / name).symlink_to(target)
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*.*")}
+    for overwrite, resume in ((True, False), (False, True), (False, False)):
+        with pytest.raises(kp.UserError, match=f"run/{name} is a link, .*: remove it"):
+            kp.train_dqn(config, tmp_path / "run", overwrite=overwrite, resume=resume)
+    assert {file: file.read_bytes() for file in tmp_path.rglob("*.*")} == before
+    assert target.read_bytes() == b"unchanged"
+
+
+def test_pipe_in_place_of_a_file_of_the_run_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "history.csv")
+    with pytest.raises(kp.UserError, match=r"history\.csv is a link, a folder or a device"):
+        RunFolder(tmp_path)
+
+
+def test_removed_history_is_whole_again_after_the_next_checkpoint(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=12, hidden_units=(8,), save_every=5)
+    history = tmp_path / "history.csv"
+    lines: list[int] = []
+
+    def remove(record: EpisodeRecord) -> None:
+        if record.episode == 7:
+            history.unlink()
+        lines.append(len(history.read_text().splitlines()) if history.exists() else 0)
+
+    kp.train_dqn(config, tmp_path, listeners=[remove])
+    assert lines == [2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 12, 13]
+    assert [row["episode"] for row in csv.DictReader(history.read_text().splitlines())] == [
+        str(episode) for episode in range(12)
+    ]
+
+
+def test_history_removed_before_the_last_checkpoint_is_whole(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=3, hidden_units=(8,))
+    history = tmp_path / "history.csv"
+    kp.train_dqn(config, tmp_path, listeners=[lambda record: history.unlink(missing_ok=True)])
+    assert len(history.read_text().splitlines()) == 4
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        OSError(24, "Too many open files", "DejaVuSans.ttf"),
+        ImportError("cannot open shared object"),
+    ],
+    ids=["OSError", "ImportError"],
+)
+def test_picture_that_cannot_be_drawn_is_drawn_by_resume(
+    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+
+    def fail(*arguments: object) -> bytes:
+        raise error
+
+    with monkeypatch.context() as patched:
+        patched.setattr("keras_pendulum.train.run_figure.draw_run", fail)
+        with pytest.raises(kp.UserError, match=r"cannot draw .*rewards\.png: .*--resume draws it"):
+            kp.train_dqn(config, tmp_path)
+    assert len((tmp_path / "history.csv").read_text().splitlines()) == 3
+    assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 2
+    kp.train_dqn(config, tmp_path, resume=True)
+    assert (tmp_path / "rewards.png").exists()
 
 
 def test_second_run_in_the_same_folder_is_refused(
