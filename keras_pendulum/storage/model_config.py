@@ -108,7 +108,7 @@ def _in_call_order(config: dict[str, Any], path: str) -> list[dict[str, Any]]:
             continue
         nodes = layer["inbound_nodes"]
         source = _only_source(nodes[0]) if len(nodes) == 1 else None
-        if source is None or source in following:
+        if source is None:
             _refuse(path, name, "does not take its input from the layer before it alone")
         following[source] = name
     chain = _names(config["input_layers"])

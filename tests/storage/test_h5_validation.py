@@ -43,6 +43,14 @@ def test_arrays_as_large_as_the_file_are_accepted_and_one_byte_more_is_refused(
             contents(file, 99)
 
 
+def test_array_without_stored_numbers_is_refused(tmp_path: Path) -> None:
+    """HDF5 would return zeros."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("a", (2, 2), "f4")
+        with pytest.raises(kp.WeightsError, match="a .* is not a plain array"):
+            contents(file, 100)
+
+
 def test_file_of_1_gib_is_read_and_a_larger_one_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "sparse.h5"
     for size, message in {2**30: "not an HDF5 file", 2**30 + 1: "larger than 1 GiB"}.items():

@@ -66,6 +66,19 @@ def test_missing_array_is_refused(tmp_path: Path) -> None:
         file.read("x")
 
 
+def test_file_that_is_cut_short_while_it_is_open_is_refused(tmp_path: Path) -> None:
+    """HDF5 would return other numbers, without an error."""
+    path = write_file(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file["long"] = np.ones(10_000)
+    with (
+        pytest.raises(kp.WeightsError, match=r"a\.h5: cannot be read, .*ends too early"),
+        open_h5(path) as opened,
+    ):
+        os.truncate(path, path.stat().st_size - 40_000)
+        opened.read("long")
+
+
 def test_one_process_serves_all_files_and_is_replaced_when_it_ends(tmp_path: Path) -> None:
     path = write_file(tmp_path / "a.h5")
     ids = []
