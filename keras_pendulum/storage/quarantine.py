@@ -145,10 +145,6 @@ class _Process:
         except (EOFError, ValueError) as error:
             raise UserError(f"cannot start a process to read the file: {error}") from error
 
-    def is_alive(self) -> bool:
-        """Returns whether the process can answer. A fork does not use the process of its parent."""
-        return self._owner == os.getpid() and self._process.poll() is None
-
     def ask(
         self, path: str, request: dict[str, Any], seconds: float, array: NDArray[Any] | None = None
     ) -> dict[str, Any]:
@@ -173,11 +169,18 @@ class _Process:
             raise WeightsError(f"{path}: {answer['error']}")
         return answer
 
-    def close_file(self) -> None:
-        """Closes the open file: Windows neither replaces nor removes an open one."""
-        if self.is_alive():
-            with contextlib.suppress(WeightsError):
-                self.ask("", {"close": None}, _SECONDS_TO_START)
+    def close_file(self) -> bool:
+        """Closes the open file: Windows neither replaces nor removes an open one.
+
+        Returns whether the process is alive. A fork does not use the process of its parent.
+        """
+        if self._owner != os.getpid() or self._process.poll() is not None:
+            return False
+        try:
+            self.ask("", {"close": None}, seconds_for(0))
+        except WeightsError:
+            return False
+        return True
 
     def stop(self) -> None:
         """Ends the process."""
@@ -237,7 +240,7 @@ _PROCESS: list[_Process] = []  # the running one
 
 def _running_process() -> _Process:
     """Returns the process of this one, a new one when there is none."""
-    if not _PROCESS or not _PROCESS[0].is_alive():
+    if not _PROCESS or not _PROCESS[0].close_file():
         _PROCESS[:] = [_Process()]
     return _PROCESS[0]
 

@@ -47,7 +47,7 @@ def test_array_without_stored_numbers_is_refused(tmp_path: Path) -> None:
     """HDF5 would return zeros."""
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("a", (2, 2), "f4")
-        with pytest.raises(kp.WeightsError, match="a .* is not a plain array"):
+        with pytest.raises(kp.WeightsError, match=r"a .* is not a plain array"):
             contents(file, 100)
 
 

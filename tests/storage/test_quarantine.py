@@ -108,12 +108,14 @@ def test_process_that_does_not_answer_in_time_is_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write_file(tmp_path / "a.h5")
-    with open_h5(path):
-        before = process_id()
     monkeypatch.setattr(quarantine, "seconds_for", lambda size: 0.2)
-    os.kill(before, signal.SIGSTOP)
-    with pytest.raises(kp.WeightsError, match="takes more than 0 s"), open_h5(path):
-        pass
+    with (
+        pytest.raises(kp.WeightsError, match="takes more than 0 s"),
+        open_h5(path) as file,
+    ):
+        before = process_id()
+        os.kill(before, signal.SIGSTOP)
+        file.read("a")
     monkeypatch.undo()
     with open_h5(path):
         assert process_id() != before
