@@ -85,7 +85,9 @@ def test_one_process_serves_all_files_and_is_replaced_when_it_ends(tmp_path: Pat
     for _ in range(2):
         with open_h5(path):
             ids.append(process_id())
-    os.kill(process_id(), signal.SIGKILL)
+    process = quarantine._PROCESS[0]._process
+    process.kill()
+    process.wait()  # until then it seems alive
     with open_h5(path) as file:
         ids.append(process_id())
         assert file.read("b/c") == 7
