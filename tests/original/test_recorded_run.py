@@ -5,14 +5,18 @@ Both were recorded under Keras 2.15, with every random number seeded by 1.
 
 from __future__ import annotations
 
+import contextlib
 import os
+import platform
 import random
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from conftest import DATA, ROOT, Command, Recorded
 
 import keras_pendulum as kp
@@ -21,6 +25,8 @@ from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import Run, make_run
 
 STRICT_EPISODES = 100  # floating-point rounding of another processor may change later ones
+# Linux reports these names. macOS (arm64) and Windows (AMD64) have other C libraries.
+STRICT_MACHINES = ("x86_64", "aarch64")
 WARMUP_EPISODES = 41
 
 
@@ -68,7 +74,7 @@ def record_actions(run: Run) -> list[Any]:
 def recorded_run(name: str) -> tuple[Recorded, list[str]]:
     """Returns the arrays and the printed lines of a recorded run with seed 1."""
     with np.load(DATA / f"{name}_run_seed1.npz") as arrays:
-        return dict(arrays), (DATA / f"{name}_run_seed1.log").read_text().splitlines()
+        return dict(arrays), (DATA / f"{name}_run_seed1.log").read_text("utf-8").splitlines()
 
 
 def run_from(recorded: Recorded, preset: str, **changes: Any) -> Run:
@@ -87,6 +93,39 @@ def require_same_history(run: Run, recorded: Recorded, lines: list[str]) -> None
     )
 
 
+@contextlib.contextmanager
+def strict_where_tried(printed: Sequence[str], lines: Sequence[str]) -> Iterator[None]:
+    """Turns a failure in the `with` block into an expected one where the runs were not tried.
+
+    Its reason says how many of the printed lines are the recorded ones, from the first on.
+    """
+    try:
+        yield
+    except AssertionError:
+        if platform.machine() in STRICT_MACHINES:
+            raise
+        pairs = zip(printed, lines, strict=False)
+        equal = next((i for i, (ours, theirs) in enumerate(pairs) if ours != theirs), len(printed))
+        pytest.xfail(
+            f"the first {equal} of {len(printed)} episodes print the recorded lines on "
+            f"{platform.system()} {platform.machine()}, where this was never tried"
+        )
+
+
+def test_failure_says_how_far_a_run_came_where_it_was_not_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(platform, "machine", lambda: "riscv64")
+    with (
+        pytest.raises(pytest.xfail.Exception, match=r"^the first 2 of 4 episodes .* riscv64, "),
+        strict_where_tried(["a", "b", "x", "d"], ["a", "b", "c", "d", "e"]),
+    ):
+        raise AssertionError
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
+    with pytest.raises(AssertionError), strict_where_tried(["x"], ["a"]):
+        raise AssertionError
+
+
 def test_original_repeats_its_first_100_episodes() -> None:
     recorded, lines = recorded_run("original")
     run = run_from(recorded, "original", episodes=STRICT_EPISODES)
@@ -96,16 +135,17 @@ def test_original_repeats_its_first_100_episodes() -> None:
 
     list(train_episodes(run))
 
-    steps = STRICT_EPISODES * 200
-    updates = STRICT_EPISODES - WARMUP_EPISODES
-    torques = np.linspace(-2, 2, 41)[recorded["action_index"][:steps]]
-    np.testing.assert_array_equal(np.concatenate(actions), torques)
-    explored = np.flatnonzero(np.unpackbits(recorded["explored"])[:steps])
-    np.testing.assert_array_equal(exploration.steps, explored)
-    np.testing.assert_array_equal(replay.batches, recorded["batch"][:updates])
-    require_same_history(run, recorded, lines)
-    losses = [record.loss for record in run.history[WARMUP_EPISODES:]]
-    np.testing.assert_allclose(losses, recorded["loss"][:updates], rtol=1e-5)
+    with strict_where_tried([record.line() for record in run.history], lines):
+        steps = STRICT_EPISODES * 200
+        updates = STRICT_EPISODES - WARMUP_EPISODES
+        torques = np.linspace(-2, 2, 41)[recorded["action_index"][:steps]]
+        np.testing.assert_array_equal(np.concatenate(actions), torques)
+        explored = np.flatnonzero(np.unpackbits(recorded["explored"])[:steps])
+        np.testing.assert_array_equal(exploration.steps, explored)
+        np.testing.assert_array_equal(replay.batches, recorded["batch"][:updates])
+        require_same_history(run, recorded, lines)
+        losses = [record.loss for record in run.history[WARMUP_EPISODES:]]
+        np.testing.assert_allclose(losses, recorded["loss"][:updates], rtol=1e-5)
 
 
 def test_walkthrough_repeats_its_first_100_episodes() -> None:
@@ -115,9 +155,10 @@ def test_walkthrough_repeats_its_first_100_episodes() -> None:
 
     list(train_episodes(run))
 
-    torques = np.concatenate(actions).astype(np.float32)
-    np.testing.assert_array_equal(torques, recorded["action"][: STRICT_EPISODES * 200])
-    require_same_history(run, recorded, lines)
+    with strict_where_tried([record.line() for record in run.history], lines):
+        torques = np.concatenate(actions).astype(np.float32)
+        np.testing.assert_array_equal(torques, recorded["action"][: STRICT_EPISODES * 200])
+        require_same_history(run, recorded, lines)
 
 
 def test_all_459_updates_of_original_reach_the_recorded_weights(
@@ -148,7 +189,9 @@ def test_train_command_prints_the_recorded_lines(command: Command, tmp_path: Pat
         *("--episodes", str(STRICT_EPISODES)),
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[:STRICT_EPISODES] == lines[:STRICT_EPISODES]
+    printed = done.stdout.splitlines()[:STRICT_EPISODES]
+    with strict_where_tried(printed, lines):
+        assert printed == lines[:STRICT_EPISODES]
 
 
 def test_example_original_prints_the_recorded_lines() -> None:
@@ -163,7 +206,9 @@ def test_example_original_prints_the_recorded_lines() -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines() == lines[:episodes]
+    printed = done.stdout.splitlines()
+    with strict_where_tried(printed, lines):
+        assert printed == lines[:episodes]
 
 
 def test_weights_file_of_keras_2_gives_the_recorded_q_values(recorded: Recorded) -> None:
