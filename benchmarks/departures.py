@@ -37,7 +37,7 @@ def departures(preset: str) -> list[str]:
 
 def measured(preset: str) -> dict[str, list[float]]:
     """Returns the regrets in benchmarks/results, by preset and by setting that is not changed."""
-    rows = json.loads((RESULTS / f"departures_{preset}.json").read_text())["rows"]
+    rows = json.loads((RESULTS / f"departures_{preset}.json").read_text("utf-8"))["rows"]
     return {row["training"]: row["regrets"] for row in rows}
 
 

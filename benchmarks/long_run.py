@@ -37,7 +37,7 @@ class Measurement(NamedTuple):
 
 def resident_memory() -> float:
     """Returns the resident memory of this process in MB."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 

@@ -43,7 +43,7 @@ def train_original() -> None:
 
 def identical_lines(process: Process) -> int:
     """Returns how many lines are those of the recorded run, from the first on."""
-    recorded = (_DATA / "original_run_seed1.log").read_text().splitlines()
+    recorded = (_DATA / "original_run_seed1.log").read_text("utf-8").splitlines()
     pairs = list(zip(process.output.splitlines(), recorded, strict=True))
     differences = (i for i, (printed, expected) in enumerate(pairs) if printed != expected)
     return next(differences, len(pairs))

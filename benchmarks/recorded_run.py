@@ -52,7 +52,7 @@ def repeat(preset: str) -> None:
     """Repeats the recorded run of a preset and prints the comparison."""
     with np.load(_DATA / f"{preset}_run_seed1.npz") as arrays:
         recorded = dict(arrays)
-    lines = (_DATA / f"{preset}_run_seed1.log").read_text().splitlines()
+    lines = (_DATA / f"{preset}_run_seed1.log").read_text("utf-8").splitlines()
     expected_torques = recorded_torques(recorded)
     config = kp.preset(preset, seed=1)
     initial = kp.DQN(config.hidden_units)

@@ -32,7 +32,7 @@ class Process(NamedTuple):
 def run_process(*arguments: str, python: str = sys.executable) -> Process:
     """Runs `python ARGUMENTS` and waits for it. Raises CalledProcessError when it fails."""
     command = [python, *arguments]
-    with tempfile.TemporaryFile("w+") as output:
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as output:
         started = time.perf_counter()
         process = subprocess.Popen(command, stdout=output)
         _, status, usage = os.wait4(process.pid, 0)
@@ -66,7 +66,11 @@ def machine() -> str:
     model = platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():
-        names = [line for line in cpuinfo.read_text().splitlines() if line.startswith("model name")]
+        names = [
+            line
+            for line in cpuinfo.read_text(encoding="utf-8").splitlines()
+            if line.startswith("model name")
+        ]
         model = names[0].split(":")[1].strip() if names else model
     parts = [f"{os.cpu_count()} cores of {model}", f"Python {platform.python_version()}"]
     return ", ".join(parts + versions(_PACKAGES))

@@ -87,7 +87,7 @@ def test_shell_completes_flags(typed: str, offered: set[str], tmp_path: Path) ->
     }
     subprocess.run(command_line(name), env=os.environ | variables, capture_output=True, check=True)
     assert {word.strip() for word in file.read_text().split("\n")} == offered
-    source = (Path(kp.__file__).parent / name / "__main__.py").read_text()
+    source = (Path(kp.__file__).parent / name / "__main__.py").read_text("utf-8")
     assert "PYTHON_ARGCOMPLETE_OK" in source[:1024]  # the shell looks for it
 
 
@@ -194,7 +194,7 @@ def test_tensorboard_shows_curves_and_phase_planes(in_process: Command, tmp_path
         assert done.returncode == 0, done.stderr
     events = EventAccumulator(str(tmp_path / "run" / "tensorboard"), {"tensors": 0})
     events.Reload()
-    with open(tmp_path / "run" / "history.csv", newline="") as file:
+    with open(tmp_path / "run" / "history.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for name, column in (("return", "return"), ("epsilon", "epsilon"), ("loss", "loss")):
         logged = {

@@ -55,9 +55,9 @@ def describe_worker(job: Job) -> Reply:
 
 def kill_worker_of_seed_0(attempts: Path, failures: int, job: Job) -> Reply:
     if job.config.seed == 0:
-        with open(attempts, "a") as file:
+        with open(attempts, "a", encoding="utf-8") as file:
             file.write("x")
-        if len(attempts.read_text()) <= failures:
+        if len(attempts.read_text(encoding="utf-8")) <= failures:
             os.kill(os.getpid(), signal.SIGKILL)
     return describe_worker(job)
 

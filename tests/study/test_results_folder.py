@@ -48,7 +48,7 @@ def test_damaged_reply_is_refused_and_the_cost_of_a_valid_one_is_logged(tmp_path
         assert result_files(folder.path) == []
         folder.save(second, reply(second))
         assert folder.missing_jobs() == [first]
-    with open(folder.path / "seconds.csv", newline="") as file:
+    with open(folder.path / "seconds.csv", encoding="utf-8", newline="") as file:
         (row,) = csv.DictReader(file)
     assert row == {
         "arm": "reference",

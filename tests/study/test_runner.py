@@ -50,9 +50,9 @@ def flaky_work(
 
     def work(job: Job) -> Reply:
         seed = job.config.seed
-        with open(attempts, "a") as file:
+        with open(attempts, "a", encoding="utf-8") as file:
             file.write(f"{seed}\n")
-        if attempts.read_text().split().count(str(seed)) <= failures.get(seed, 0):
+        if attempts.read_text(encoding="utf-8").split().count(str(seed)) <= failures.get(seed, 0):
             raise error
         return reply(job)
 

@@ -45,7 +45,7 @@ def result_files(folder: Path) -> dict[str, bytes]:
 
 def logged_runs(folder: Path) -> list[tuple[str, int]]:
     """Returns the runs in the log of costs, in the order in which they finished."""
-    with open(folder / "seconds.csv", newline="") as file:
+    with open(folder / "seconds.csv", encoding="utf-8", newline="") as file:
         return [(row["arm"], int(row["seed"])) for row in csv.DictReader(file)]
 
 
@@ -121,7 +121,7 @@ def test_tables_and_figure_are_written(finished: Path) -> None:
         assert row["regrets"] == regrets
         assert row["regret_iqm"] == pytest.approx(sum(regrets) / 2)
         assert row["regret_low"] <= row["regret_iqm"] <= row["regret_high"]
-    with open(finished / "table.csv", newline="") as file:
+    with open(finished / "table.csv", encoding="utf-8", newline="") as file:
         table = list(csv.DictReader(file))
     assert [row["arm"] for row in table] == [row["arm"] for row in rows] == ["small", "starved"]
     assert float(table[1]["regret_iqm"]) == rows[1]["regret_iqm"]
@@ -265,14 +265,14 @@ def test_mistake_is_one_error_line_and_changes_no_file(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("file").write_text("mine")
+    Path("file").write_text("mine", encoding="utf-8")
     for name, content in {
         "other": "{}",
         "broken": "{",
         "old": '{"versions": {"numpy": "1"}}',
     }.items():
         Path(name).mkdir()
-        Path(name, "study.json").write_text(content)
+        Path(name, "study.json").write_text(content, encoding="utf-8")
     Path("full").mkdir()
     Path("full", "config.json").touch()
     before = sorted(Path().rglob("*"))
@@ -285,8 +285,8 @@ def test_mistake_is_one_error_line_and_changes_no_file(
     assert re.fullmatch(r"error: .*\n", printed.err)
     assert message in printed.err
     assert sorted(Path().rglob("*")) == before
-    assert Path("file").read_text() == "mine"
-    assert Path("other", "study.json").read_text() == "{}"
+    assert Path("file").read_text(encoding="utf-8") == "mine"
+    assert Path("other", "study.json").read_text(encoding="utf-8") == "{}"
 
 
 def test_help_imports_no_numpy() -> None:

@@ -37,7 +37,7 @@ def test_run_leaves_its_four_files(tmp_path: Path) -> None:
     settings = json.loads((folder / "config.json").read_text())
     assert kp.Config(**{**settings, "hidden_units": tuple(settings["hidden_units"])}) == config
 
-    with open(folder / "history.csv", newline="") as file:
+    with open(folder / "history.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert ",".join(rows[0]) == (
         "episode,average_reward,return,epsilon,loss,environment_steps,updates,seconds"
