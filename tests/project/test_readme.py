@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import pytest
 from conftest import ROOT
+from test_dependencies import PYTHONS, WITHOUT_WHEELS
 from test_floor_plan import imported_modules
 
 import keras_pendulum as kp
@@ -23,6 +24,7 @@ from benchmarks.report import RESULTS
 PACKAGE = Path(kp.__file__).parent
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+DOCUMENTS = sorted(ROOT.glob("*.md")) + sorted(ROOT.glob("docs/*.md"))
 ROWS = [(preset, name) for preset in BEFORE for name in departures(preset)]
 COMMANDS = sorted(
     {match.strip() for match in re.findall(r"python -m keras_pendulum\.[^\n`#&]+", README)}
@@ -38,6 +40,39 @@ def table_of_departures(preset: str) -> dict[str, list[str]]:
 
 def summary(regrets: list[float]) -> str:
     return f"mean {sum(regrets) / len(regrets):.1f}, worst {max(regrets):.1f}"
+
+
+def fenced(language: str, document: Path = ROOT / "README.md") -> list[str]:
+    """Returns the blocks of a language in a document, each without the newline at its end."""
+    text = document.read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)\n```$", text, re.MULTILINE | re.DOTALL)
+
+
+def test_lines_for_windows_are_the_two_lines() -> None:
+    for line, block in zip(fenced("sh")[:2], fenced("bat"), strict=True):
+        # `.ci/run` finds the line of the tests by its `-m pytest`.
+        for ours, theirs in (
+            ("python3 ", "py -3.13 "),
+            ("/bin/", "\\Scripts\\"),
+            ("python -m pytest", "pytest"),
+        ):
+            line = line.replace(ours, theirs)
+        assert block.splitlines() == line.split(" && ")
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_shell_lines_have_double_quotes_only(document: Path) -> None:
+    # The command prompt of Windows passes single quotes on.
+    for block in fenced("(?:sh|bat)", document):
+        assert "'" not in re.sub(r" #.*", "", block)
+
+
+def test_pythons_and_systems_are_those_of_the_dependencies() -> None:
+    start = " ".join(README.split("## Two lines")[1].split("Training ends")[0].split())
+    *others, last = PYTHONS
+    assert f"Python {', '.join(others)} or {last} on Linux" in start
+    for system in ("Python 3.14", *WITHOUT_WHEELS):
+        assert f"**{system}" in start
 
 
 @pytest.mark.parametrize("preset", BEFORE)
@@ -144,7 +179,7 @@ def test_command_has_the_flags_that_the_readme_uses(line: str) -> None:
             assert re.search(rf"{word}\b", shown), word
 
 
-@pytest.mark.parametrize("document", sorted(ROOT.glob("*.md")) + sorted(ROOT.glob("docs/*.md")))
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_links_lead_to_files(document: Path) -> None:
     for link in re.findall(
         r"\]\((?!https:)([^)#]+)(?:#[^)]*)?\)", document.read_text(encoding="utf-8")
