@@ -16,7 +16,7 @@ from typing import Any
 from keras_pendulum.config.config import Config
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.atomic_write import write_atomically
-from keras_pendulum.storage.folder_lock import lock_folder
+from keras_pendulum.storage.folder_lock import LOCK_FILE, lock_folder
 from keras_pendulum.study.arms import Arm
 from keras_pendulum.study.job import (
     Job,
@@ -63,7 +63,7 @@ class ResultsFolder:
         Without its `study.json`, a folder is usable when all its results belong to this study.
         """
         try:
-            names = [file.name for file in self._folder.iterdir()]
+            names = {file.name for file in self._folder.iterdir()} - {LOCK_FILE}
         except FileNotFoundError:
             return
         except OSError as error:

@@ -172,6 +172,6 @@ def test_no_result_is_written_into_another_folder_at_the_same_path(tmp_path: Pat
         assert len(result_files(target)) == 1
         target.rename(tmp_path / "moved")
         shutil.copytree(tmp_path / "moved", target)
-        with pytest.raises(UserError, match="study was moved, removed or replaced"):
+        with pytest.raises(UserError, match=r"study, or the file .lock in it, was moved"):
             folder.save(second, reply(second))
     assert len(result_files(target)) == 1
