@@ -10,14 +10,14 @@ the table and the figure are made. Three minutes on two cores.
 
 from __future__ import annotations
 
-import resource
+import os
 import sys
 import tempfile
 import time
 from pathlib import Path
 
 import keras_pendulum as kp
-from benchmarks.report import write
+from benchmarks.report import PeakMemory, write
 from keras_pendulum.study.arms import Arm
 from keras_pendulum.study.dask_workers import local_workers
 from keras_pendulum.study.figure import draw_study
@@ -42,7 +42,7 @@ def main(runs: int = 8000, workers: int = 8) -> None:
     arms = [
         Arm(f"arm {i}", kp.preset("reference", updates_per_episode=i + 1)) for i in range(_ARMS)
     ]
-    with tempfile.TemporaryDirectory() as out:
+    with tempfile.TemporaryDirectory() as out, PeakMemory(os.getpid()) as peak:
         folder = ResultsFolder(Path(out) / "study", arms, runs // _ARMS)
         with local_workers(workers) as client, folder.create_and_lock():
             client.wait_for_workers(workers)
@@ -72,7 +72,7 @@ def main(runs: int = 8000, workers: int = 8) -> None:
         "searched for missing runs (s)": round(searched - searching, 1),
         "table and figure (s)": round(drawn - searched, 1),
         "folder (MB)": round(size / 1e6, 1),
-        "peak memory (MB)": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3),
+        "peak memory (MB)": round(peak.megabytes),
     }
     write("study_scale", f"python -m benchmarks.study_scale {runs} {workers}", [row])
 

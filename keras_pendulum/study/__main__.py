@@ -124,7 +124,14 @@ def _workers(
 
     if arguments.scheduler:
         return cluster_workers(arguments.scheduler, versions)
-    return local_workers(min(arguments.workers or len(os.sched_getaffinity(0)), job_count))
+    return local_workers(min(arguments.workers or _core_count(), job_count))
+
+
+def _core_count() -> int:
+    """Returns the number of cores that this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _make_runs(

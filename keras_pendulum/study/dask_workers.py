@@ -33,6 +33,10 @@ _LOCAL_SETTINGS = {
 }
 
 
+# On Windows, which has no masks of signals, each worker ignores Ctrl-C by itself.
+_IGNORE_CONTROL_C = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+
+
 @contextmanager
 def local_workers(count: int) -> Iterator[Client]:
     """Starts a scheduler in this process, reachable from this machine only, and its workers.
@@ -169,6 +173,7 @@ def _start_cluster() -> LocalCluster:
             dashboard_address="127.0.0.1:0",
             memory_limit=None,  # Dask would pause or restart a worker at a share of the memory
             silence_logs=logging.CRITICAL,
+            preload=_IGNORE_CONTROL_C if sys.platform == "win32" else None,
         )
     except RuntimeError as error:
         problem = " ".join(str(error).split())
@@ -197,8 +202,10 @@ def _start_resource_tracker() -> None:
     """Starts the helper process of `multiprocessing` before a Dask thread does.
 
     The helper unblocks SIGINT in the thread that starts it, and it would print a warning when the
-    study is killed.
+    study is killed. Windows has no such helper.
     """
+    if sys.platform == "win32":
+        return
     sys.warnoptions.append("ignore:resource_tracker:UserWarning")
     try:
         resource_tracker.ensure_running()
@@ -211,11 +218,13 @@ def _control_c_delayed() -> Iterator[None]:
     """Delays Ctrl-C to the end of the `with` block; threads that start in it never get it."""
     pressed: list[int] = []
     handler = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    if sys.platform != "win32":  # there, the main thread alone gets it
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if sys.platform != "win32":
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         signal.signal(signal.SIGINT, handler)
         if pressed and callable(handler):  # it is not where SIGINT is ignored
             handler(signal.SIGINT, None)

@@ -59,6 +59,7 @@ def test_lock_of_another_process_holds_until_the_process_is_killed(tmp_path: Pat
     folder.mkdir()
     (tmp_path / "locking.py").write_text(LOCKING, encoding="utf-8")
     with running_module("locking", folder, cwd=tmp_path, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
         assert process.stdout.readline().strip() == b"locked"
         with pytest.raises(kp.UserError, match="another run is writing"), lock_folder(folder):
             pass
