@@ -63,7 +63,7 @@ WRONG = [
     ),
     ([RECORDED, "--out", "."], "cannot write ."),
     ([RECORDED, "--out", "no/such/folder.html"], "cannot write no/such/folder.html"),
-    ([RECORDED, "--out", "/proc/page.html"], "cannot write /proc/page.html"),
+    ([RECORDED, "--out", "text.h5/page.html"], "cannot write text.h5"),
     ([RECORDED, "--out", "n" * 300], "File name too long"),
     ([RECORDED, "--open"], "there is no display for a browser: leave out --open"),
 ]

@@ -1,4 +1,4 @@
-"""A process that only saves; test_atomic_write.py kills it."""
+"""A process that only saves; test_atomic_write_posix.py kills it."""
 
 from __future__ import annotations
 

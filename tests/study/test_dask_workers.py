@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -58,7 +57,7 @@ def kill_worker_of_seed_0(attempts: Path, failures: int, job: Job) -> Reply:
         with open(attempts, "a", encoding="utf-8") as file:
             file.write("x")
         if len(attempts.read_text(encoding="utf-8")) <= failures:
-            os.kill(os.getpid(), signal.SIGKILL)
+            psutil.Process().kill()
     return describe_worker(job)
 
 
@@ -184,9 +183,11 @@ def test_scheduler_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPat
         assert refusal(address, {}).startswith(f"no scheduler answers at {address}: start one")
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("end", [subprocess.Popen.kill, subprocess.Popen.terminate])
 def test_lost_scheduler_is_noticed_while_no_job_finishes(
-    number: signal.Signals, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    end: Callable[[subprocess.Popen[bytes]], None],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     work = partial(wait_a_minute, tmp_path / "started")
     lines: list[str] = []
@@ -194,7 +195,7 @@ def test_lost_scheduler_is_noticed_while_no_job_finishes(
 
         def stop_scheduler() -> None:
             wait_for((tmp_path / "started").exists)
-            scheduler.send_signal(number)
+            end(scheduler)
 
         with cluster_workers(address, installed_versions()) as client:
             Thread(target=stop_scheduler).start()

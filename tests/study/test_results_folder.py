@@ -157,21 +157,3 @@ def test_folder_in_use_is_refused(tmp_path: Path) -> None:
         second.create_and_lock(),
     ):
         pass
-
-
-def test_no_result_is_written_into_another_folder_at_the_same_path(tmp_path: Path) -> None:
-    target, link = tmp_path / "study", tmp_path / "link"
-    target.mkdir()
-    link.symlink_to(target)
-    folder = ResultsFolder(link, own_arms(["reference"], []), 2)
-    with folder.create_and_lock():
-        first, second = folder.jobs()
-        link.unlink()
-        link.symlink_to(tmp_path)
-        folder.save(first, reply(first))
-        assert len(result_files(target)) == 1
-        target.rename(tmp_path / "moved")
-        shutil.copytree(tmp_path / "moved", target)
-        with pytest.raises(UserError, match=r"study, or the file .lock in it, was moved"):
-            folder.save(second, reply(second))
-    assert len(result_files(target)) == 1

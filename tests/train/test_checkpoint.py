@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import signal
-import subprocess
 import threading
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -16,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from conftest import assert_same, command_line
+from conftest import assert_same
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import RENAMED, Config
@@ -67,29 +64,6 @@ def test_resumed_run_equals_an_uninterrupted_run(name: str, tmp_path: Path) -> N
         for name in ("resumed", "uninterrupted")
     }
     assert rows["resumed"] == rows["uninterrupted"]
-
-
-def test_control_c_saves_a_checkpoint_and_exits_130(tmp_path: Path) -> None:
-    arguments = ["--preset", "original", "--seed", "5", "--out", str(tmp_path / "run")]
-    with subprocess.Popen(
-        command_line("train", *arguments, "--episodes", "100000"),
-        cwd=tmp_path,
-        env=os.environ,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
-        lines = []
-        for line in process.stdout:
-            lines.append(line)
-            if line.startswith("Episode: 13,"):
-                process.send_signal(signal.SIGINT)
-    assert process.returncode == 130
-    assert lines[-1].startswith("Continue: python -m keras_pendulum.train --resume")
-    config = load_config(tmp_path / "run" / "pendulum_weight.h5")
-    saved = load_checkpoint(tmp_path / "run" / "pendulum_weight.h5", config)
-    printed = [line for line in lines if line.startswith("Episode: ")]
-    assert [record.line() + "\n" for record in saved.history] == printed
 
 
 def test_run_killed_in_its_first_episode_replaces_the_old_run_and_can_be_resumed(

@@ -1,0 +1,116 @@
+"""The commands on a terminal, behind a redirection, and with names that are no text."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import Command, command_line, without_gpu_note
+from test_commands import LATIN_1
+
+if sys.platform == "win32":
+    pytest.skip("needs a pseudoterminal, a shell and names of bytes", allow_module_level=True)
+
+import pty
+import termios
+
+
+def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
+    controller, terminal = pty.openpty()
+    termios.tcsetwinsize(terminal, (24, 80))
+    arguments = ["--preset", "original", "--episodes", "43", "--hidden-units", "8"]
+    with subprocess.Popen(
+        command_line("train", *arguments), cwd=tmp_path, stdout=terminal, close_fds=True
+    ) as process:
+        os.close(terminal)
+        output = b""
+        try:
+            while chunk := os.read(controller, 4096):
+                output += chunk
+        except OSError:  # raised by Linux when the other end is closed
+            pass
+    os.close(controller)
+    assert process.returncode == 0
+    bars, *closing = output.decode().replace("\r\n", "\n").split("\n")
+    shown = bars.replace("\x1b[K", "").split("\r")[1:]
+    assert all(len(line) < 80 for line in shown)  # a wrapped line is not drawn over
+    number = r"-?[\d.e-]+"
+    assert re.fullmatch(
+        rf"43/43 ━+ return {number} regret {number} ε 0.58 loss {number} \d+ steps/s 0:00 left",
+        shown[-1],
+    )
+    assert "Episode: " not in output.decode()
+    assert "Regret: " in "\n".join(closing)
+    # Each suggested command works.
+    offered = [line.split(": ", 1)[1] for line in closing if ": python -m" in line]
+    assert [line.split()[2] for line in offered] == [
+        f"keras_pendulum.{name}" for name in ("evaluate", "play", "page")
+    ]
+    assert all(shlex.split(line)[-1].endswith(".h5") or "render" in line for line in offered)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="macOS has names of text only")
+def test_folder_without_a_text_as_name_is_used_but_not_by_tensorboard(
+    in_process: Command, tmp_path: Path
+) -> None:
+    out = os.fsdecode(b"runs/\xff")
+    words = ["train", "--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out"]
+    done = in_process(*words, out, "--tensorboard")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.fullmatch(r"error: TensorBoard cannot write in .*udcff.*\n", done.stderr)
+    assert not (tmp_path / "runs").exists()
+    assert in_process(*words, out).returncode == 0
+    film, network = os.fsdecode(b"\xff.gif"), f"{out}/pendulum_weight.h5"
+    done = in_process("evaluate", network, "--episodes", "1", "--gif", film)
+    assert done.returncode == 0, done.stderr
+    assert os.listdir(bytes(tmp_path / "runs")) == [b"\xff"]  # noqa: PTH208
+    assert (tmp_path / film).exists()
+
+
+def test_progress_bar_in_latin_1_replaces_unknown_characters(tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
+    controller, terminal = pty.openpty()
+    done = subprocess.run(
+        command_line("train", *words),
+        cwd=tmp_path,
+        env=LATIN_1,
+        stdout=terminal,
+        stderr=subprocess.PIPE,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"?" in os.read(controller, 2**16)
+    os.close(controller)
+    os.close(terminal)
+
+
+def redirected(to: str, *words: str, folder: Path) -> tuple[int, str]:
+    """Returns exit status and stderr of a command whose output the shell redirects."""
+    done = subprocess.run(
+        ["sh", "-c", f'exec "$@" {to}', "sh", *command_line(*words)],
+        cwd=folder,
+        # Buffered output, so that the last write fails.
+        env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return done.returncode, without_gpu_note(done.stderr)
+
+
+def test_closed_output_does_not_stop_training(tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
+    assert redirected(">&-", "train", *words, folder=tmp_path) == (0, "")
+    assert (tmp_path / "run" / "rewards.png").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")
+def test_full_disk_of_the_output_is_one_error_line(tmp_path: Path) -> None:
+    result = redirected(">/dev/full", "evaluate", "original", folder=tmp_path)
+    assert result == (2, "error: [Errno 28] No space left on device\n")
