@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import sys
+import time
 import uuid
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from keras_pendulum.errors import UserError
+
+_RETRIES, _SECONDS_BETWEEN = 40, 0.05  # 2 s in all
+_Result = TypeVar("_Result")
 
 
 def write_atomically(
@@ -28,7 +34,8 @@ def write_atomically(
     such as a folder, a pipe or a device. What is at `path` is then unchanged.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex}.tmp")
+    # Few digits, because Windows limits the length of a path.
+    temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.tmp")
     try:
         if Path(path).exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "a device, a pipe or a socket"
@@ -39,13 +46,38 @@ def write_atomically(
                 file.flush()
                 os.fsync(file.fileno())
             check(temporary)
-            temporary.replace(target)
+            retry_while_open(lambda: temporary.replace(target))
         finally:
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # it is gone, or the error above says more
+                temporary.unlink()
     except OSError as error:
         raise UserError(f"cannot write {path}: {error.strerror or error}") from error
     with contextlib.suppress(OSError):  # the new file is in place, and not every system can do it
         _flush_folder(target.parent)
+
+
+def retry_while_open(action: Callable[[], _Result]) -> _Result:
+    """Returns the result of `action`, which opens, replaces or removes a file.
+
+    Windows refuses that while another program has the file open, such as a spreadsheet or a virus
+    scanner. There, the action is repeated for 2 s.
+
+    Raises OSError as the action does; on Windows, a PermissionError says what to do.
+    """
+    for attempt in itertools.count():
+        try:
+            return action()
+        except PermissionError as error:
+            if sys.platform != "win32":
+                raise
+            if attempt == _RETRIES:
+                raise PermissionError(
+                    error.errno,
+                    "another program has the file open, or it is read-only; close it there, and "
+                    "run the command again",
+                ) from error
+        time.sleep(_SECONDS_BETWEEN)
+    raise AssertionError  # the loop has no end
 
 
 def _flush_folder(folder: Path) -> None:

@@ -161,7 +161,7 @@ def _address_space() -> int:
     """Returns the bytes of this process's address space, 0 where the system does not say."""
     if sys.platform != "linux":
         return 0
-    pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0])
+    pages = int(Path("/proc/self/statm").read_bytes().split()[0])
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 

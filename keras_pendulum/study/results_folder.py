@@ -15,7 +15,7 @@ from typing import Any
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.errors import UserError
-from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.folder_lock import LOCK_FILE, lock_folder
 from keras_pendulum.study.arms import Arm
 from keras_pendulum.study.job import (
@@ -136,7 +136,9 @@ class ResultsFolder:
             [job.arm, job.config.seed, reply.worker, *(f"{value:.3f}" for value in seconds)]
         )
         try:
-            with open(self._log, "a", encoding="utf-8") as file:
+            with retry_while_open(
+                lambda: open(self._log, "a", encoding="utf-8", newline="")
+            ) as file:
                 file.write(line.getvalue())
         except OSError as error:
             raise UserError(f"cannot write {self._log}: {error.strerror}") from error

@@ -7,13 +7,14 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.history import CSV_HEADER, EpisodeRecord
-from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.folder_lock import lock_folder
 
 
@@ -124,7 +125,9 @@ class RunFolder:
         self.require_not_moved()
         try:
             # Not mode "a": it would make a file without the rows before.
-            with open(self.history, "r+", encoding="ascii") as file:
+            with retry_while_open(
+                lambda: open(self.history, "r+", encoding="ascii", newline="")
+            ) as file:
                 file.seek(0, os.SEEK_END)
                 file.write(record.csv_row() + "\n")
         except FileNotFoundError:
@@ -152,6 +155,6 @@ class RunFolder:
 def _remove(*files: Path) -> None:
     for file in files:
         try:
-            file.unlink(missing_ok=True)
+            retry_while_open(partial(file.unlink, missing_ok=True))
         except OSError as error:
             raise UserError(f"cannot replace {file}: {error.strerror}") from error
