@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import io
 import os
+import re
 import shlex
 import signal
 import sys
@@ -94,14 +96,19 @@ def run_command(command: Callable[[], int]) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if isinstance(error, BrokenPipeError):
             return 1
+        if sys.platform == "win32" and error.errno == errno.EINVAL:  # a pipe without a reader
+            return 1
         print(f"error: {one_line(str(error))}", file=sys.stderr)
         return 2
 
 
 def _prepare_output() -> None:
     """Lets `print` succeed where the output is closed or cannot encode a character."""
-    if sys.stdout is None:  # closed by the parent process
+    # A stream that the parent process has closed is None. `print` would take None for stdout.
+    if sys.stdout is None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="replace")
 
@@ -118,6 +125,16 @@ def nonempty_path(text: str) -> str:
 
 
 def shell_word(path: str | os.PathLike[str]) -> str:
-    """Returns a path as a word of a shell command; no command takes the word for a flag."""
+    """Returns a path as a word of a command in sh, cmd and PowerShell.
+
+    No command takes the word for a flag.
+    """
     word = os.fspath(path)
-    return shlex.quote(f"./{word}" if word.startswith("-") else word)
+    if sys.platform == "win32":
+        word = word.replace("\\", "/")
+    if word.startswith("-"):
+        word = f"./{word}"
+    if re.fullmatch(r"[A-Za-z0-9_+=:./-]+", word):
+        return word
+    # Between double quotes, sh replaces these; cmd knows no single quotes.
+    return shlex.quote(word) if set(word) & set('"$`\\!') else f'"{word}"'

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
 from keras_pendulum.errors import UserError
-from keras_pendulum.study.arms import Arm, default_arms, own_arms
+from keras_pendulum.study.arms import Arm, default_arms, own_arms, study_name
 from keras_pendulum.tensorflow_setup import require_tensorflow
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--arm",
         action="append",
         default=[],
-        metavar="'NAME: PRESET field=value …'",
+        metavar='"NAME: PRESET field=value …"',
         help="an arm: a preset with some settings changed; may be repeated",
     )
     parser.add_argument(
@@ -85,8 +85,8 @@ def _study(arguments: argparse.Namespace) -> int:
 
     from keras_pendulum.study.results_folder import ResultsFolder
 
-    slugs = "-vs-".join(arm.slug for arm in arms) if chosen else "original-to-reference"
-    path = Path(arguments.out or Path("studies") / slugs[:100])
+    name = study_name(arms) if chosen else "original-to-reference"
+    path = Path(arguments.out or Path("studies") / name)
     folder = ResultsFolder(path, arms, arguments.seeds)
     folder.require_usable()
     total = folder.job_count

@@ -16,7 +16,11 @@ _FIXED_DEFECTS = {"updates_per_episode": "update-starvation", "target_update": "
 # The defects that only `walkthrough` has.
 _OTHER_DEFECTS: dict[str, dict[str, Any]] = {"index-truncation": {"stored_index": "truncated"}}
 _ANY_SAVE_EVERY = Config.save_every
-_MAX_NAME = 100  # letters, because files have the arm's name
+# Files have the arm's name. With these limits, no path below the folder where the command runs is
+# longer than 200 characters: Windows allows 260 in all.
+_MAX_NAME = 64
+_MAX_STUDY_NAME = 150  # with the name of one arm twice
+_RESERVED = re.compile(r"(con|nul|aux|prn|com\d|lpt\d)(\.|$)")  # no file of Windows has such a name
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,8 @@ class Arm:
     @property
     def slug(self) -> str:
         """The name in file names."""
-        return re.sub(r"[^a-z0-9_.=]+", "-", self.name.lower()).strip("-.") or "arm"
+        slug = re.sub(r"[^a-z0-9_.=]+", "-", self.name.lower()).strip("-.") or "arm"
+        return f"arm-{slug}" if _RESERVED.match(slug) else slug
 
     @property
     def training_config(self) -> Config:
@@ -91,11 +96,17 @@ def own_arms(presets: Sequence[str], texts: Sequence[str]) -> list[Arm]:
     return compared
 
 
+def study_name(arms: Sequence[Arm]) -> str:
+    """Returns the name of the folder for a study of these arms."""
+    slugs = [arm.slug for arm in arms]
+    return "-vs-".join(slugs)[: _MAX_STUDY_NAME - 2 * max(map(len, slugs))].rstrip("-.")
+
+
 def _parse_arm(text: str) -> Arm:
     name, colon, rest = text.partition(":")
     words = rest.split()
     if not colon or not name.strip() or not words:
-        raise ConfigError(f"the arm {text!r} is not of the form 'NAME: PRESET field=value …'")
+        raise ConfigError(f'the arm {text!r} is not of the form "NAME: PRESET field=value …"')
     settings: dict[str, Any] = {}
     for word in words[1:]:
         field, equals, value = word.partition("=")

@@ -19,7 +19,7 @@ from keras_pendulum.display import require_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
-from keras_pendulum.train.progress_bar import make_progress
+from keras_pendulum.train.progress_bar import can_draw_bar, make_progress
 
 if TYPE_CHECKING:
     from keras_pendulum.train.live_plot import LivePlot
@@ -102,7 +102,7 @@ def _train(arguments: argparse.Namespace) -> int:
         )
     if live:
         live.finish()
-    if sys.stdout.isatty() and progress and not result.finished:
+    if can_draw_bar() and progress and not result.finished:
         print()  # ends the line of the bar
     _print_summary(result, folder, time.perf_counter() - started, score=not interrupt.asked)
     return 130 if interrupt.asked else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 import sys
 import time
@@ -22,10 +23,15 @@ _MIN_WIDTH, _MAX_WIDTH = 4, 20  # of the bar, in characters
 
 
 def make_progress(config: Config) -> Callable[[EpisodeRecord], None]:
-    """Returns a listener: a progress bar on a terminal, else the original's line per episode."""
-    if sys.stdout.isatty():
+    """Returns a listener: a progress bar where one can be drawn, else the original's line."""
+    if can_draw_bar():
         return _ProgressBar(config)
     return lambda record: print(record.line(), flush=True)
+
+
+def can_draw_bar() -> bool:
+    """Returns whether the output is a terminal that can write over a line."""
+    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
 
 
 class _ProgressBar:
@@ -40,6 +46,11 @@ class _ProgressBar:
         self._recent: deque[EpisodeRecord] = deque(maxlen=_MEAN_OVER + 1)
         self._optimum: float | None = None
         self._drawn = 0.0  # time of the last drawing, in s
+        self._marks = "━─"  # of the finished and of the remaining episodes
+        try:
+            self._marks.encode(sys.stdout.encoding)
+        except UnicodeEncodeError:
+            self._marks = "#-"
 
     def __call__(self, record: EpisodeRecord) -> None:
         """Draws the line after an episode."""
@@ -56,10 +67,12 @@ class _ProgressBar:
         count, figures = f"{done}/{total}", " ".join(self._figures(record))
         width = columns - len(count) - len(figures) - 2
         width = max(_MIN_WIDTH, min(_MAX_WIDTH, width))
-        bar = "━" * (width * done // total)
-        line = f"{count} {bar:─<{width}} {figures}"
-        # A line that is wider than the terminal wraps and cannot be overwritten.
-        print(f"\r{line[:columns]}\x1b[K", end="\n" if done == total else "", flush=True)
+        finished = width * done // total
+        bar = self._marks[0] * finished + self._marks[1] * (width - finished)
+        line = f"{count} {bar} {figures}"
+        # A line that is wider than the terminal wraps and cannot be overwritten. Spaces erase the
+        # rest of the line before: an escape code would be printed by consoles that know none.
+        print(f"\r{line[:columns]:<{columns}}", end="\n" if done == total else "", flush=True)
 
     def _figures(self, record: EpisodeRecord) -> list[str]:
         """Returns the texts to the right of the bar."""

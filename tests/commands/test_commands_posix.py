@@ -25,7 +25,11 @@ def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     termios.tcsetwinsize(terminal, (24, 80))
     arguments = ["--preset", "original", "--episodes", "43", "--hidden-units", "8"]
     with subprocess.Popen(
-        command_line("train", *arguments), cwd=tmp_path, stdout=terminal, close_fds=True
+        command_line("train", *arguments),
+        cwd=tmp_path,
+        env={**os.environ, "TERM": "xterm"},
+        stdout=terminal,
+        close_fds=True,
     ) as process:
         os.close(terminal)
         output = b""
@@ -37,13 +41,14 @@ def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     os.close(controller)
     assert process.returncode == 0
     bars, *closing = output.decode().replace("\r\n", "\n").split("\n")
-    shown = bars.replace("\x1b[K", "").split("\r")[1:]
-    assert all(len(line) < 80 for line in shown)  # a wrapped line is not drawn over
+    shown = bars.split("\r")[1:]
+    assert {len(line) for line in shown} == {79}  # a wrapped line is not drawn over
     number = r"-?[\d.e-]+"
     assert re.fullmatch(
         rf"43/43 ━+ return {number} regret {number} ε 0.58 loss {number} \d+ steps/s 0:00 left",
-        shown[-1],
+        shown[-1].rstrip(),
     )
+    assert "\x1b" not in output.decode()
     assert "Episode: " not in output.decode()
     assert "Regret: " in "\n".join(closing)
     # Each suggested command works.

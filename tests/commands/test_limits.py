@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from keras_pendulum.optimum import __main__ as optimum
 from keras_pendulum.page import __main__ as page
 from keras_pendulum.play import __main__ as play
 from keras_pendulum.study import __main__ as study
+from keras_pendulum.study.arms import own_arms, study_name
 from keras_pendulum.train import __main__ as train
 
 GREATEST_SEED = 4_294_967_295
@@ -119,16 +122,53 @@ def folder_of_study(
     return folders[0].name if folders else error
 
 
-def test_arm_has_at_most_100_letters_and_the_folder_of_the_study_too(
+def test_arm_has_at_most_64_letters_and_the_folder_of_the_study_few_more(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def name_of(*names: str) -> str:
         return folder_of_study(list(names), monkeypatch, capsys)
 
-    assert name_of("a" * 100) == "a" * 100
-    assert "longer than 100 letters" in name_of("a" * 101)
-    assert name_of("a" * 47, "b" * 48) == f"{'a' * 47}-vs-{'b' * 48}"  # 99 letters
-    assert name_of("a" * 48, "b" * 49) == f"{'a' * 48}-vs-{'b' * 48}"  # one letter is cut
+    assert name_of("a" * 64) == "a" * 22
+    assert "longer than 64 letters" in name_of("a" * 65)
+    assert name_of("a" * 37, "b" * 35) == f"{'a' * 37}-vs-{'b' * 35}"  # 76 letters
+    assert name_of("a" * 37, "b" * 36) == f"{'a' * 37}-vs-{'b' * 35}"  # one letter is cut
+    # A name that ends with a dot is another one on Windows.
+    assert name_of("a" * 37, f"{'b' * 34}.5") == f"{'a' * 37}-vs-{'b' * 34}"
+
+
+@pytest.mark.parametrize(
+    "lengths", [(1,), (8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8), (36, 37), (64, 64)]
+)
+def test_no_path_of_a_study_is_longer_than_200_characters(
+    lengths: tuple[int, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from keras_pendulum.study import results_folder
+    from keras_pendulum.study.job import Job, Reply, RunResult
+
+    longest_seed = study._MAX_SEEDS - 1
+    texts = [
+        f"{chr(97 + i) * length}: original warmup_episodes={i}" for i, length in enumerate(lengths)
+    ]
+    arms = own_arms([], texts)
+    replaced: list[str] = []
+    original = os.replace
+
+    def record(source: Path, target: Path) -> None:
+        replaced.extend(os.path.relpath(path, tmp_path) for path in (source, target))
+        original(source, target)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, "replace", record)
+    monkeypatch.setattr(results_folder, "decode", lambda data, job: RunResult(0.0, [0.0], [], []))
+    folder = results_folder.ResultsFolder(Path("studies") / study_name(arms), arms, 1)
+    with folder.create_and_lock():
+        for arm in arms:
+            config = replace(arm.config, seed=longest_seed)
+            job = Job(arm.name, arm.slug, config, folder.versions)
+            folder.save(job, Reply(b"result", 1.0, 1.0, 2.0, "host:1"))
+        folder.write("table.json", b"{}")
+    assert max(map(len, replaced)) <= 200
+    assert any(f"-seed{longest_seed}.json" in path for path in replaced)
 
 
 @pytest.mark.parametrize(("count", "more"), [(5, ""), (6, "; and 1 more")])

@@ -57,9 +57,32 @@ def test_own_arm_is_a_preset_with_settings() -> None:
     assert (one.baseline, two.baseline, three.baseline) == (None, None, "reference")
 
 
-def test_arm_with_a_name_of_100_letters_is_accepted() -> None:
-    (arm,) = own_arms([], [f"{'n' * 100}: original"])
-    assert arm.slug == "n" * 100
+def test_arm_with_a_name_of_64_letters_is_accepted() -> None:
+    (arm,) = own_arms([], [f"{'n' * 64}: original"])
+    assert arm.slug == "n" * 64
+
+
+@pytest.mark.parametrize("name", ["con", "NUL", "aux", "Prn", "com1", "lpt9.5", "nul.", "com0 "])
+def test_arm_with_a_name_that_windows_reserves_has_another_one_in_file_names(name: str) -> None:
+    (arm,) = own_arms([], [f"{name}: original"])
+    assert arm.name == name.strip()
+    assert arm.slug == f"arm-{name.lower().strip(' .')}"
+
+
+@pytest.mark.parametrize("name", ["console", "nul-1", "com", "com10", "a.con", "prn1"])
+def test_arm_with_a_name_that_windows_allows_keeps_it_in_file_names(name: str) -> None:
+    (arm,) = own_arms([], [f"{name}: original"])
+    assert arm.slug == name
+
+
+def test_arm_with_letters_that_windows_forbids_has_others_in_file_names() -> None:
+    (arm,) = own_arms([], ['a<b>c"d|e?f*g/h\\i. . : original'])
+    assert arm.slug == "a-b-c-d-e-f-g-h-i"
+
+
+def test_reserved_name_and_its_replacement_are_two_arms_of_one_name() -> None:
+    with pytest.raises(ConfigError, match="two arms have the name"):
+        own_arms([], ["con: original", "arm-con: reference"])
 
 
 @pytest.mark.parametrize(
@@ -73,7 +96,7 @@ def test_arm_with_a_name_of_100_letters_is_accepted() -> None:
         ("a: reference episodes", "expected field=value"),
         ("a: reference seed=3", "cannot set seed"),
         ("reference: original", "two arms have the name"),
-        (f"{'n' * 101}: original", "longer than 100 letters"),
+        (f"{'n' * 65}: original", "longer than 64 letters"),
     ],
 )
 def test_wrong_arm_is_a_config_error_of_one_line(text: str, message: str) -> None:

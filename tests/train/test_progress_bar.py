@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import io
+import re
 import sys
 
 import pytest
@@ -28,12 +30,13 @@ def printed_figures(
         "keras_pendulum.evaluate.evaluation.optimal_training_return", lambda config: optimum
     )
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "200")
     listener = make_progress(kp.preset("reference", episodes=100))
     for episode in range(13):
         listener(record(episode))
-    lines = capsys.readouterr().out.replace("\x1b[K", "").split("\r")[1:]
-    return [line.split(" ", 2)[2] for line in lines]
+    lines = capsys.readouterr().out.split("\r")[1:]
+    return [line.split(" ", 2)[2].rstrip() for line in lines]
 
 
 def test_bar_shows_regret_and_speed_of_the_last_10_episodes(
@@ -52,3 +55,49 @@ def test_bar_shows_no_regret_without_a_known_optimum(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert "regret" not in "".join(printed_figures(float("nan"), monkeypatch, capsys))
+
+
+class Terminal(io.TextIOWrapper):
+    def isatty(self) -> bool:
+        return True
+
+
+def drawn(encoding: str, term: str, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Returns the output for 1 and 2 of 2 episodes on a terminal of 60 columns."""
+    monkeypatch.setattr(
+        "keras_pendulum.evaluate.evaluation.optimal_training_return", lambda config: -4.0
+    )
+    output = Terminal(io.BytesIO(), encoding=encoding, errors="replace", newline="")
+    monkeypatch.setattr(sys, "stdout", output)
+    monkeypatch.setattr("keras_pendulum.train.progress_bar._SECONDS_BETWEEN_DRAWINGS", 0.0)
+    monkeypatch.setenv("TERM", term)
+    monkeypatch.setenv("COLUMNS", "60")
+    listener = make_progress(kp.preset("reference", episodes=2))
+    for episode in range(2):
+        listener(record(episode)._replace(seconds=3600.0 * (2 - episode)))
+    output.flush()
+    assert isinstance(output.buffer, io.BytesIO)
+    return output.buffer.getvalue().decode(encoding)
+
+
+def test_bar_needs_no_escape_codes(monkeypatch: pytest.MonkeyPatch) -> None:
+    longer, shorter = drawn("utf-8", "xterm", monkeypatch).removesuffix("\n").split("\r")[1:]
+    assert (longer + shorter).isprintable()
+    assert len(longer) == len(shorter) == 59  # nothing of the longer line is left
+    assert longer.startswith("1/2 ━━")
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
+def test_bar_has_other_marks_where_the_code_page_lacks_them(
+    encoding: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, after = drawn(encoding, "xterm", monkeypatch).split("\r")[1:]
+    assert before.startswith("1/2 ##")
+    assert re.fullmatch(r"#+-+", before.split()[1])
+    assert re.fullmatch(r"#+", after.split()[1])
+
+
+def test_dumb_terminal_gets_a_line_for_each_episode(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert drawn("utf-8", "dumb", monkeypatch) == "".join(
+        f"{record(episode).line()}\n" for episode in range(2)
+    )
