@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
+from keras_pendulum.storage import atomic_write
+from keras_pendulum.study import results_folder
 from keras_pendulum.study.arms import own_arms
 from keras_pendulum.study.job import (
     Job,
@@ -58,6 +63,28 @@ def test_damaged_reply_is_refused_and_the_cost_of_a_valid_one_is_logged(tmp_path
         "evaluation": "2.000",
         "total": "4.000",
     }
+
+
+def test_log_that_windows_has_open_gets_its_line_when_it_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refusals = [PermissionError(errno.EACCES, "Permission denied")] * 3
+
+    def open_closed(path: Path, mode: str, **options: Any) -> Any:
+        if refusals:
+            raise refusals.pop()
+        return open(path, mode, **options)
+
+    monkeypatch.setattr(atomic_write, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setattr(atomic_write, "time", SimpleNamespace(sleep=lambda seconds: None))
+    monkeypatch.setattr(results_folder, "open", open_closed, raising=False)
+    folder = ResultsFolder(tmp_path / "study", own_arms(["reference"], []), 1)
+    with folder.create_and_lock():
+        (job,) = folder.jobs()
+        folder.save(job, reply(job))
+    assert refusals == []
+    lines = (folder.path / "seconds.csv").read_bytes().splitlines()
+    assert lines[1:] == [b"reference,0,host:7,1.000,2.000,4.000"]
 
 
 def test_results_of_other_versions_are_missing(tmp_path: Path) -> None:

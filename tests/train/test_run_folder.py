@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import matplotlib.image
@@ -14,7 +16,9 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.storage import atomic_write
 from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.train import run_folder
 from keras_pendulum.train.checkpoint import (
     CheckpointWriter,
     load_checkpoint,
@@ -284,3 +288,37 @@ def test_picture_shows_the_optimal_and_the_random_return(
     assert len(drawn) == 1
     assert drawn[0][0] == pytest.approx(optimum, abs=0.05)
     assert drawn[0][1] == pytest.approx(random, rel=0.1)
+
+
+def test_files_that_windows_has_open_are_used_when_they_are_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = kp.preset("original", episodes=1)
+    folder = RunFolder(tmp_path, config.environment)
+    folder.start_files(config, [])
+    folder.picture.touch()
+    refusals = dict.fromkeys((folder.history.name, folder.picture.name), 3)
+    unlink = Path.unlink
+
+    def require_closed(path: Path) -> None:
+        if refusals.get(path.name):
+            refusals[path.name] -= 1
+            raise PermissionError(errno.EACCES, "Permission denied")
+
+    def open_closed(path: Path, mode: str, **options: Any) -> Any:
+        require_closed(path)
+        return open(path, mode, **options)
+
+    def unlink_closed(path: Path, missing_ok: bool = False) -> None:
+        require_closed(path)
+        unlink(path, missing_ok)
+
+    monkeypatch.setattr(atomic_write, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setattr(atomic_write, "time", SimpleNamespace(sleep=lambda seconds: None))
+    monkeypatch.setattr(run_folder, "open", open_closed, raising=False)
+    monkeypatch.setattr(Path, "unlink", unlink_closed)
+    folder.append(EpisodeRecord(0, -1.0, -200.0, 0.9, 0.1, 200, 1, 0.5))
+    assert folder.history.read_bytes().endswith(b"\n0,-1.0,-200.0,0.9,0.1,200,1,0.5\n")
+    folder.start_files(config, [])
+    assert not folder.picture.exists()
+    assert set(refusals.values()) == {0}
