@@ -1,6 +1,6 @@
 """The updates of `reference` beside settings not taken, on seeds that no result is reported for.
 
-    python -m benchmarks.choosing [SEEDS ['NAME: PRESET field=value …' …]]
+    python -m benchmarks.choosing [SEEDS ["NAME: PRESET field=value …" …]]
 
 Trains arms with the training seeds 100, 101, … (16 seeds), two runs at a time, and evaluates each
 run greedily on the starts of seeds 1000 to 1299. Arms are written as for the study; the default
