@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -13,6 +14,7 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from pathlib import Path
 from threading import Thread
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -110,6 +112,15 @@ def test_local_workers_use_one_thread_and_only_this_machine_reaches_them() -> No
         assert dashboard(client) is None
     assert {each.reply.result for each in finished if each.reply} == {b"1"}
     assert len({each.reply.worker for each in finished if each.reply}) == 1
+
+
+def test_workers_on_windows_ignore_control_c(monkeypatch: pytest.MonkeyPatch) -> None:
+    def handler() -> str:  # sent by value: conftest.py would set the handler
+        return str(signal.getsignal(signal.SIGINT))
+
+    monkeypatch.setattr(dask_workers, "sys", SimpleNamespace(platform="win32"))
+    with local_workers(1) as client:
+        assert list(client.run(handler).values()) == [str(signal.SIG_IGN)]
 
 
 def test_end_of_local_workers_does_not_wait_for_their_jobs(tmp_path: Path) -> None:
