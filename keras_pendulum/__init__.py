@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
     from keras_pendulum.evaluate.evaluation import Score, evaluate_policy
     from keras_pendulum.optimum.optimal_return import optimal_return
-    from keras_pendulum.storage.weights import find_weights, load_weights, save_weights
+    from keras_pendulum.storage.find_weights import find_weights
+    from keras_pendulum.storage.weights import load_weights, save_weights
     from keras_pendulum.train.train_dqn import TrainingResult, train_dqn
 
 __all__ = [
@@ -50,7 +51,8 @@ _MODULES = {
     "errors": ("ConfigError", "UserError", "WeightsError"),
     "evaluate.evaluation": ("Score", "evaluate_policy"),
     "optimum.optimal_return": ("optimal_return",),
-    "storage.weights": ("find_weights", "load_weights", "save_weights"),
+    "storage.find_weights": ("find_weights",),
+    "storage.weights": ("load_weights", "save_weights"),
     "train.train_dqn": ("TrainingResult", "train_dqn"),
 }
 

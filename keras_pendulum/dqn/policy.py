@@ -20,7 +20,7 @@ ACTIVATIONS: dict[str, Callable[..., Any]] = {
 
 
 def activations_of(activation: str, layers: int) -> list[str]:
-    """Returns the activation of each hidden layer: one name for all, or one each and commas."""
+    """Returns the activation of each hidden layer: one name for all, or names with commas."""
     names = activation.split(",")
     return names * layers if len(names) == 1 else names
 

@@ -63,7 +63,8 @@ def _evaluate(arguments: argparse.Namespace) -> int:
 
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluate_policy
-        from keras_pendulum.storage.weights import find_weights, load_weights
+        from keras_pendulum.storage.find_weights import find_weights
+        from keras_pendulum.storage.weights import load_weights
 
     def require_open_window(env: Any) -> None:
         if arguments.render and _window_closed():  # Gymnasium ignores a closed window

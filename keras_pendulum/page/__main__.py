@@ -52,7 +52,8 @@ def _write(arguments: argparse.Namespace) -> int:
 
     with fast_import():
         from keras_pendulum.page.build import build_page
-        from keras_pendulum.storage.weights import find_weights, load_weights
+        from keras_pendulum.storage.find_weights import find_weights
+        from keras_pendulum.storage.weights import load_weights
 
     path = find_weights(arguments.weights)
     page = build_page(load_weights(path, arguments.activation), path, arguments.gravity)

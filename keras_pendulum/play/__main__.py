@@ -77,7 +77,8 @@ def _load_agent(
     require_tensorflow()
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluation_gravity
-        from keras_pendulum.storage.weights import find_weights, load_weights
+        from keras_pendulum.storage.find_weights import find_weights
+        from keras_pendulum.storage.weights import load_weights
 
     from keras_pendulum.dqn.policy import greedy_policy
     from keras_pendulum.environments.actions import TorqueGrid

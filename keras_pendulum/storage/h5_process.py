@@ -136,8 +136,9 @@ def _unpack(stream: BinaryIO, size: int) -> tuple[str, BinaryIO]:
 
 
 def _limit(file_size: int) -> None:
-    """Limits this process until the next file; where the system has no limits, the parent waits
-    for a limited time.
+    """Limits memory and processor time until the next file, where the system can.
+
+    Elsewhere, the clock of the parent ends this process.
     """
     if sys.platform != "win32":
         import resource

@@ -11,7 +11,6 @@ import os
 import platform
 import warnings
 from collections.abc import Iterable
-from importlib import resources
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -91,8 +90,8 @@ def encode_weights(
         "evaluated_return": evaluated_return,
     }
     # A unique name, because HDF5 does not open two files of one name, not even in memory.
-    name = f"{uuid4().hex}.h5"
-    with h5py.File(name, "w", driver="core", backing_store=False, block_size=2**23) as file:
+    unique = f"{uuid4().hex}.h5"
+    with h5py.File(unique, "w", driver="core", backing_store=False, block_size=2**23) as file:
         write_layers(file, weights)
         attributes = file.create_group(_GROUP).attrs
         for name, value in values.items():
@@ -225,10 +224,7 @@ def _provenance(attributes: dict[str, Any], path: str) -> Provenance:
 
 
 def changed_versions(file: H5File) -> list[str]:
-    """Returns what differs between the recorded and the present versions, such as `keras 3.14.0`.
-
-    Each entry is a recorded version.
-    """
+    """Returns the recorded versions that are not the present ones, such as `keras 3.14.0`."""
     attributes = file.attributes[_GROUP]
     recorded = {"keras_pendulum": attributes["version"], **json.loads(attributes["versions"])}
     present = {"keras_pendulum": __version__, **_versions()}
@@ -245,24 +241,3 @@ def _versions() -> dict[str, str]:
         "python": platform.python_version(),
         **{module.__name__: module.__version__ for module in (tf, keras, gymnasium, np)},
     }
-
-
-def find_weights(name: str) -> Path:
-    """Returns the path of a weights file: `name` itself, or the shipped file `name`(.h5).
-
-    Raises WeightsError when neither exists.
-    """
-    path = Path(name)
-    try:
-        if path.is_file():
-            return path
-    except OSError as error:  # a name that no file can have
-        raise WeightsError(f"{name}: {error.strerror}; expected a weights file (.h5)") from error
-    # A wheel holds the shipped weights inside the package, a checkout beside it.
-    package = Path(str(resources.files("keras_pendulum")))
-    for folder in (package / "shipped_weights", package.parent / "weights"):
-        for candidate in (folder / name, folder / f"{name}.h5"):
-            if path.name == name and candidate.is_file():
-                return candidate
-    problem = "not a file" if path.exists() else "no such file"
-    raise WeightsError(f"{name}: {problem}; expected a weights file (.h5)")

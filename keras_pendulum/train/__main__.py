@@ -70,7 +70,8 @@ def _train(arguments: argparse.Namespace) -> int:
     live = _live_plot() if arguments.live else None
 
     with fast_import():
-        from keras_pendulum.storage.weights import find_weights, load_weights
+        from keras_pendulum.storage.find_weights import find_weights
+        from keras_pendulum.storage.weights import load_weights
         from keras_pendulum.train.checkpoint import load_config
         from keras_pendulum.train.run_folder import RunFolder
         from keras_pendulum.train.tensorboard import TensorBoardLog

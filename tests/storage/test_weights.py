@@ -412,24 +412,6 @@ def test_recorded_keras_2_file_loads() -> None:
     assert loaded.provenance.gravity is None
 
 
-def test_find_weights_returns_a_shipped_file_unless_the_current_folder_has_that_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "reference").mkdir()  # a folder of that name is ignored
-    shipped = kp.find_weights("reference")
-    assert shipped == kp.find_weights("reference.h5")
-    provenance = kp.load_weights(shipped).provenance
-    assert (provenance.preset, provenance.seed, provenance.gravity) == ("reference", 0, 1.0)
-    (tmp_path / "reference.h5").touch()
-    assert kp.find_weights("reference.h5") == Path("reference.h5")
-    with pytest.raises(kp.WeightsError, match="folder/reference: no such file"):
-        kp.find_weights("folder/reference")
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(kp.WeightsError, match="folder: not a file"):
-        kp.find_weights("folder")
-
-
 def test_keras_file_of_a_dqn_loads_with_its_provenance(tmp_path: Path) -> None:
     saved = kp.DQN((5, 5, 5, 5), 5, activation="relu", provenance=network().provenance)
     saved.save(tmp_path / "a.keras")

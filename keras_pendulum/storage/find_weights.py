@@ -1,0 +1,29 @@
+"""The path of a weights file: the user's own, or one that the package ships."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from keras_pendulum.errors import WeightsError
+
+
+def find_weights(name: str) -> Path:
+    """Returns the path of a weights file: `name` itself, or the shipped file `name`(.h5).
+
+    Raises WeightsError when neither exists.
+    """
+    path = Path(name)
+    try:
+        if path.is_file():
+            return path
+    except OSError as error:  # a name that no file can have
+        raise WeightsError(f"{name}: {error.strerror}; expected a weights file (.h5)") from error
+    # A wheel holds the shipped weights inside the package, a checkout beside it.
+    package = Path(str(resources.files("keras_pendulum")))
+    for folder in (package / "shipped_weights", package.parent / "weights"):
+        for candidate in (folder / name, folder / f"{name}.h5"):
+            if path.name == name and candidate.is_file():
+                return candidate
+    problem = "not a file" if path.exists() else "no such file"
+    raise WeightsError(f"{name}: {problem}; expected a weights file (.h5)")
