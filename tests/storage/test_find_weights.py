@@ -26,7 +26,5 @@ def test_find_weights_returns_a_shipped_file_unless_the_current_folder_has_that_
 
 
 def test_shipped_file_is_found_by_its_name_and_by_no_path() -> None:
-    with pytest.raises(
-        kp.WeightsError, match=r"^\.\./weights/\.\./weights/reference: no such file"
-    ):
+    with pytest.raises(kp.WeightsError, match="weights/reference: no such file"):
         kp.find_weights("../weights/../weights/reference")
