@@ -15,11 +15,33 @@ import warnings
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from keras_pendulum.errors import UserError, one_line
+from keras_pendulum.errors import UserError, did_you_mean, one_line
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """An argument parser that prints errors as one line and supports shell completion."""
+    """An argument parser that prints errors as one line and supports shell completion.
+
+    Args:
+        help_all: adds the flag `--help-all`, which shows the hidden flags too.
+        options: of argparse.
+    """
+
+    def __init__(self, help_all: bool = False, **options: Any) -> None:
+        super().__init__(**options)
+        self._hidden: dict[argparse.Action, str | None] = {}  # help texts that `--help` leaves out
+        if help_all:
+            self.add_argument("--help-all", action=_HelpAll, nargs=0, help="show all flags")
+
+    def hide(self, action: argparse.Action) -> None:
+        """Leaves a flag out of `--help`; `--help-all` and shell completion show it."""
+        self._hidden[action] = action.help
+        action.help = argparse.SUPPRESS
+
+    def show_hidden(self) -> None:
+        """Shows all flags from now on."""
+        for action, text in self._hidden.items():
+            action.help = text
+        self._hidden = {}
 
     def error(self, message: str) -> NoReturn:
         """Prints the error and exits with status 2."""
@@ -31,8 +53,33 @@ class OneLineParser(argparse.ArgumentParser):
         if "_ARGCOMPLETE" in os.environ:
             import argcomplete
 
+            self.show_hidden()
             argcomplete.autocomplete(self)
-        return super().parse_args(*words)
+        arguments, unknown = self.parse_known_args(*words)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._similar_flag(unknown)}")
+        return arguments
+
+    def _similar_flag(self, words: list[str]) -> str:
+        """Returns "; did you mean FLAG?" for the first mistyped flag among the words, or ""."""
+        known = [
+            flag
+            for action in self._actions
+            if action.help != argparse.SUPPRESS or action in self._hidden
+            for flag in action.option_strings
+        ]
+        flags = [word.partition("=")[0] for word in words if word.startswith("-")]
+        return did_you_mean(flags[0], known) if flags else ""
+
+
+class _HelpAll(argparse.Action):
+    """The flag that prints the help with the hidden flags and exits."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        assert isinstance(parser, OneLineParser)
+        parser.show_hidden()
+        parser.print_help()
+        parser.exit()
 
 
 class ControlC:

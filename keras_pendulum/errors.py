@@ -1,5 +1,7 @@
 """Errors that a user can correct; each message is one line."""
 
+from collections.abc import Iterable
+
 _LONGEST = 300  # characters of a message
 
 
@@ -24,6 +26,16 @@ def require_type(name: str, value: object, expected: type | tuple[type, ...]) ->
         types = expected if isinstance(expected, tuple) else (expected,)
         names = " or ".join(kind.__name__ for kind in types)
         raise TypeError(one_line(f"{name} is {value!r}; expected {names}"))
+
+
+def did_you_mean(word: str, names: Iterable[str]) -> str:
+    """Returns "; did you mean NAME?" with the name that resembles a mistyped word, or ""."""
+    import difflib
+
+    by_lower_case = {name.lower(): name for name in names}
+    # A much longer word resembles no name, and comparing it takes long.
+    found = difflib.get_close_matches(word[:_LONGEST].lower(), by_lower_case, 1)
+    return f"; did you mean {by_lower_case[found[0]]}?" if found else ""
 
 
 def one_line(message: str) -> str:

@@ -16,7 +16,7 @@ from keras_pendulum.config.fields import (
     setting,
 )
 from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import ConfigError
+from keras_pendulum.errors import ConfigError, did_you_mean
 
 LARGEST_FILE = 2**30  # bytes of a `.h5` file; a checkpoint of `reference` has 4.5 MB
 # Settings of version 0.1 that have another name now.
@@ -245,4 +245,6 @@ def require_known(name: str) -> None:
     if name in RENAMED:
         raise ConfigError(f"the setting {name} is now {RENAMED[name]}")
     if name not in Config.__dataclass_fields__:
-        raise ConfigError(f"unknown setting {name}")
+        raise ConfigError(
+            f"unknown setting {name}{did_you_mean(name, Config.__dataclass_fields__)}"
+        )

@@ -6,20 +6,30 @@ import argparse
 from dataclasses import fields
 from typing import Any
 
+from keras_pendulum.cli import OneLineParser
 from keras_pendulum.config.config import RENAMED, Config, parse_setting
 from keras_pendulum.config.fields import Switch, Text, format_value, kind_of
 from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.errors import ConfigError
 
+# The settings that people change first. `--help` shows these, `--help-all` shows all.
+_FIRST = (
+    *("gravity", "episodes", "seed", "hidden_units", "replay_capacity", "batch_size", "discount"),
+    *("epsilon_decay", "updates_per_episode", "learning_rate"),
+)
 
-def add_config_flags(parser: argparse.ArgumentParser) -> None:
+
+def add_config_flags(parser: OneLineParser) -> None:
     """Adds one flag for each setting but `preset`; a flag that is not typed stays unset."""
-    group = parser.add_argument_group("settings (each preset has its own defaults)")
+    first = parser.add_argument_group(
+        "settings that people change first (each preset has its own defaults)"
+    )
+    others = parser.add_argument_group("other settings")
     for spec in fields(Config):
         if spec.name != "preset":
             kind = kind_of(spec)
             choices = kind.choices if isinstance(kind, Text) else None
-            group.add_argument(
+            flag = (first if spec.name in _FIRST else others).add_argument(
                 _flag(spec.name),
                 dest=spec.name,
                 action=_Setting,
@@ -28,6 +38,8 @@ def add_config_flags(parser: argparse.ArgumentParser) -> None:
                 metavar=None if choices else "{true,false}" if isinstance(kind, Switch) else "N",
                 help=f"{spec.metadata['help']} [{_defaults(spec.name)}]".replace("%", "%%"),
             )
+            if spec.name not in _FIRST:
+                parser.hide(flag)
     for name in RENAMED:
         parser.add_argument(_flag(name), dest=name, action=_Setting, help=argparse.SUPPRESS)
 

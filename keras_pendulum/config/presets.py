@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from keras_pendulum.config.config import Config, require_known
-from keras_pendulum.errors import ConfigError
+from keras_pendulum.errors import ConfigError, did_you_mean
 
 _REFERENCE = Config()
 # The final listing of the inverted-pendulum page (July 2023), with its defects.
@@ -101,13 +101,28 @@ PRESETS: dict[str, Config] = {
 }
 
 
+# The preset to name to someone who asks for an environment alone.
+_PRESET_OF = {"Pendulum-v1": "reference", "CartPole-v1": "cartpole"}
+
+
 def preset(name: str = "reference", **changes: Any) -> Config:
     """Returns the preset `name` with some settings changed.
 
-    Raises ConfigError for an unknown preset or setting, and for a value out of range.
+    Raises ConfigError for an unknown preset or setting, for a value out of range, and for another
+    environment without its gravity.
     """
     if name not in PRESETS:
-        raise ConfigError(f"unknown preset {name!r}; expected one of {', '.join(PRESETS)}")
+        raise ConfigError(
+            f"unknown preset {name!r}; expected one of {', '.join(PRESETS)}"
+            f"{did_you_mean(str(name), PRESETS)}"
+        )
     for setting in changes:
         require_known(setting)
+    own = PRESETS[name].environment
+    for other, suitable in _PRESET_OF.items():
+        if changes.get("environment") == other != own and "gravity" not in changes:
+            raise ConfigError(
+                f"the preset {name} belongs to {own}: for {other}, take the preset {suitable} "
+                f"(--preset {suitable})"
+            )
     return replace(PRESETS[name], **changes)

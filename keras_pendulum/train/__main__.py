@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 def main(argv: Sequence[str] | None = None) -> int:
     """Trains as the command line says; returns the exit status."""
     parser = OneLineParser(
+        help_all=True,
         prog="python -m keras_pendulum.train",
         description="Train a DQN on the pendulum or on CartPole, and evaluate it.",
         epilog="Ctrl-C saves a checkpoint; --resume continues from it.",

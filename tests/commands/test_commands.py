@@ -74,7 +74,7 @@ def test_shell_completes_flags(typed: str, offered: set[str], tmp_path: Path) ->
 
 def test_every_setting_is_a_flag_with_a_help_text() -> None:
     done = subprocess.run(
-        command_line("train", "--help"),
+        command_line("train", "--help-all"),
         capture_output=True,
         text=True,
         check=True,
@@ -288,6 +288,9 @@ def test_render_without_a_display_is_one_error_line(command: Command) -> None:
 
 WRONG = [
     (["train", "--preset", "nonsense"], "unknown preset 'nonsense'"),
+    (["train", "--preset", "cart-pole"], "did you mean cartpole?"),
+    (["train", "--epsiodes", "5"], "--epsiodes 5; did you mean --episodes?"),
+    (["evaluate", "reference", "--jsn"], "unrecognized arguments: --jsn; did you mean --json?"),
     (["train", "--episodes", "-5"], "episodes is -5"),
     (["train", "--episodes", "ten"], "episodes is 'ten'; expected a whole number"),
     (["train", "--gravity", "nan"], "gravity is nan"),
@@ -312,7 +315,7 @@ WRONG = [
     (["train", "--init", RECORDED, "--hidden-units", "8"], "hidden_units (512, 256, 128)"),
     (["train", "--preset", "cartpole-original", "--init", RECORDED], "has environment Pendulum-v1"),
     (["train", "--preset", "cartpole-original", "--gravity", "1"], "gravity 1.0 belongs to"),
-    (["train", "--environment", "CartPole-v1"], "gravity 1.0 belongs to Pendulum-v1; CartPole-v1"),
+    (["train", "--environment", "CartPole-v1"], "take the preset cartpole (--preset cartpole)"),
     (["train", "--out", "text.h5"], "cannot make the folder text.h5"),
     (["train", "--out", "text.h5/run"], "cannot make the folder text.h5"),
     (["evaluate"], "the following arguments are required: WEIGHTS.h5"),

@@ -23,7 +23,7 @@ def flag(setting: str) -> str:
 
 
 def make_parser() -> OneLineParser:
-    parser = OneLineParser()
+    parser = OneLineParser(help_all=True)
     add_config_flags(parser)
     return parser
 
@@ -46,8 +46,17 @@ def error_line(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 def help_lines(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     """The help text of each flag, on one line."""
     monkeypatch.setenv("COLUMNS", "1000")  # no line breaks within a help text
-    _, *flags = make_parser().format_help().split("\n  --")
-    return {f"--{text.split()[0]}": " ".join(text.split()) for text in flags}
+    parser = make_parser()
+    parser.show_hidden()
+    return flags_in(parser.format_help())
+
+
+def flags_in(shown: str) -> dict[str, str]:
+    """Returns the help text of each flag by its name, without `--help-all`."""
+    _, *flags = shown.split("\n  --")
+    texts = {f"--{text.split()[0]}": " ".join(text.split()) for text in flags}
+    texts.pop("--help-all")
+    return texts
 
 
 def test_flags_that_are_not_typed_stay_unset() -> None:
@@ -118,6 +127,35 @@ def test_every_old_flag_is_refused(name: str, capsys: pytest.CaptureFixture[str]
 
 def test_help_lists_the_settings_without_the_old_names(help_lines: dict[str, str]) -> None:
     assert set(help_lines) == {flag(name) for name in SETTINGS}
+
+
+def test_short_help_shows_ten_settings() -> None:
+    shown = set(flags_in(make_parser().format_help()))
+    assert len(shown) == 10
+    assert shown >= {"--episodes", "--seed", "--gravity", "--learning-rate", "--hidden-units"}
+
+
+def test_help_all_prints_every_setting_and_exits(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        typed("--help-all")
+    assert set(flags_in(capsys.readouterr().out)) == {flag(name) for name in SETTINGS}
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_mistyped_flag_is_refused_with_the_similar_one(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for words in ([f"{flag(name)}x", "1"], [f"{flag(name)}x=1"]):
+        assert error_line(capsys, *words) == (
+            f"error: unrecognized arguments: {' '.join(words)}; did you mean {flag(name)}?"
+        )
+
+
+@pytest.mark.parametrize("name", RENAMED)
+def test_mistyped_old_flag_is_not_refused_with_the_old_one(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert f"did you mean {flag(name)}?" not in error_line(capsys, f"{flag(name)}x", "1")
 
 
 @pytest.mark.parametrize(

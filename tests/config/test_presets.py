@@ -137,9 +137,49 @@ def test_unknown_preset_is_refused_with_the_names_of_the_presets(name: str) -> N
         kp.preset(name)
 
 
+@pytest.mark.parametrize(
+    ("name", "similar"),
+    [("refrence", "reference"), ("CARTPOLE", "cartpole"), ("swing-up", "swingup")],
+)
+def test_mistyped_preset_is_refused_with_the_similar_one(name: str, similar: str) -> None:
+    with pytest.raises(kp.ConfigError, match=rf"cartpole; did you mean {similar}\?$"):
+        kp.preset(name)
+
+
 def test_unknown_setting_is_refused_by_name() -> None:
-    with pytest.raises(kp.ConfigError, match=r"^unknown setting learning_speed$"):
-        kp.preset("reference", learning_speed=1)
+    with pytest.raises(kp.ConfigError, match=r"^unknown setting colour$"):
+        kp.preset("reference", colour=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "similar"),
+    [
+        ("learning_speed", "learning_rate"),
+        ("epsiodes", "episodes"),
+        ("hiddenUnits", "hidden_units"),
+    ],
+)
+def test_mistyped_setting_is_refused_with_the_similar_one(name: str, similar: str) -> None:
+    with pytest.raises(
+        kp.ConfigError, match=rf"^unknown setting {name}; did you mean {similar}\?$"
+    ):
+        kp.preset("reference", **{name: 1})
+
+
+@pytest.mark.parametrize(
+    ("name", "environment", "suitable"),
+    [("reference", "CartPole-v1", "cartpole"), ("cartpole-original", "Pendulum-v1", "reference")],
+)
+def test_other_environment_without_its_gravity_is_refused_with_a_preset(
+    name: str, environment: str, suitable: str
+) -> None:
+    with pytest.raises(
+        kp.ConfigError, match=rf"take the preset {suitable} \(--preset {suitable}\)"
+    ):
+        kp.preset(name, environment=environment)
+    assert kp.preset(suitable, environment=environment) == kp.preset(suitable)
+    gravity = 1.0 if environment == "Pendulum-v1" else None
+    assert kp.preset(name, environment=environment, gravity=gravity).environment == environment
 
 
 @pytest.mark.parametrize("name", RENAMED)

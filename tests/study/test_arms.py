@@ -90,7 +90,10 @@ def test_reserved_name_and_its_replacement_are_two_arms_of_one_name() -> None:
     [
         ("nothing", "is not of the form"),
         ("a: nonsense", "unknown preset 'nonsense'"),
-        ("a: reference colour=red", "unknown setting colour"),
+        ("a: refrence", "did you mean reference"),
+        ("a: reference colour=red", "unknown setting colour$"),
+        ("a: reference batchsize=8", "unknown setting batchsize; did you mean batch_size"),
+        ("a: reference environment=CartPole-v1", "take the preset cartpole"),
         ("a: reference episodes=ten", "episodes is 'ten'; expected a whole number"),
         ("a: reference episodes=-1", "episodes is -1"),
         ("a: reference episodes", "expected field=value"),
