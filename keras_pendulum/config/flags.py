@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from keras_pendulum.cli import OneLineParser
+from keras_pendulum.completion import complete_with, names
 from keras_pendulum.config.config import RENAMED, Config, parse_setting
 from keras_pendulum.config.fields import Switch, Text, format_value, kind_of
 from keras_pendulum.config.presets import PRESETS
@@ -38,6 +39,8 @@ def add_config_flags(parser: OneLineParser) -> None:
                 metavar=None if choices else "{true,false}" if isinstance(kind, Switch) else "N",
                 help=f"{spec.metadata['help']} [{_defaults(spec.name)}]".replace("%", "%%"),
             )
+            if isinstance(kind, Switch):
+                complete_with(flag, names(("true", "false")))
             if spec.name not in _FIRST:
                 parser.hide(flag)
     for name in RENAMED:

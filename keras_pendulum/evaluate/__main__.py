@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
+from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.display import draw_without_display, require_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
+from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 
 if TYPE_CHECKING:
@@ -28,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         description="Evaluate the policy in a weights file and compare it with the best possible "
         "return.",
     )
-    parser.add_argument(
+    weights = parser.add_argument(
         "weights", metavar="WEIGHTS.h5", help="a file, or the name of a shipped one"
     )
     parser.add_argument(
@@ -50,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--gif", type=nonempty_path, metavar="FILE", help="save a film of the first episode"
     )
+    complete_with(weights, weights_files(shipped_names))
     arguments = parser.parse_args(argv)
     return run_command(lambda: _evaluate(arguments))
 

@@ -11,8 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
+from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
+from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 
 _HEAD = b"<!doctype html>\n<!-- keras_pendulum page:"  # the first bytes of every page
@@ -24,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="python -m keras_pendulum.page",
         description="Write a page that runs in a browser and shows the network of a weights file.",
     )
-    parser.add_argument(
+    weights = parser.add_argument(
         "weights", metavar="WEIGHTS.h5", help="a file, or the name of a shipped one"
     )
     parser.add_argument(
@@ -39,6 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     add_activation_flag(parser)
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
+    complete_with(weights, weights_files(shipped_names))
     arguments = parser.parse_args(argv)
     return run_command(lambda: _write(arguments))
 

@@ -17,10 +17,12 @@ from keras_pendulum.cli import (
     nonempty_path,
     run_command,
 )
+from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.config.config import Config, validate_setting
 from keras_pendulum.display import require_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
+from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 
 if TYPE_CHECKING:
@@ -41,7 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
     )
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the first start [random]")
-    parser.add_argument(
+    weights = parser.add_argument(
         "--against",
         type=nonempty_path,
         metavar="WEIGHTS.h5",
@@ -51,6 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--print-steps", action="store_true", help="print a line for each of your steps"
     )
+    complete_with(weights, weights_files(shipped_names))
     arguments = parser.parse_args(argv)
     return run_command(lambda: _play(arguments))
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
 
 from keras_pendulum.errors import WeightsError
+from keras_pendulum.storage.shipped_weights import shipped_folders
 
 
 def find_weights(name: str) -> Path:
@@ -19,9 +19,7 @@ def find_weights(name: str) -> Path:
             return path
     except OSError as error:  # a name that no file can have
         raise WeightsError(f"{name}: {error.strerror}; expected a weights file (.h5)") from error
-    # A wheel holds the shipped weights inside the package, a checkout beside it.
-    package = Path(str(resources.files("keras_pendulum")))
-    for folder in (package / "shipped_weights", package.parent / "weights"):
+    for folder in shipped_folders():
         for candidate in (folder / name, folder / f"{name}.h5"):
             if path.name == name and candidate.is_file():
                 return candidate

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.completion import complete_with, folders, names_with_commas
+from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.errors import UserError
 from keras_pendulum.study.arms import Arm, default_arms, own_arms, study_name
 from keras_pendulum.tensorflow_setup import require_tensorflow
@@ -39,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         epilog="Ctrl-C stops. Run the same command again to continue, or with more seeds to extend "
         "the study.",
     )
-    parser.add_argument(
+    presets = parser.add_argument(
         "--presets", type=_preset_names, default=[], metavar="A,B,…", help="these presets as arms"
     )
     parser.add_argument(
@@ -52,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--seeds", type=int, default=10, metavar="N", help="runs of each arm: seeds 0 to N-1 [10]"
     )
-    parser.add_argument(
+    out = parser.add_argument(
         "--out", type=nonempty_path, metavar="DIR", help="folder of the study [studies/ARMS]"
     )
     place = parser.add_mutually_exclusive_group()
@@ -68,6 +70,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar="ADDRESS",
         help="use the workers of this Dask scheduler, such as tcp://10.0.0.1:8786",
     )
+    complete_with(presets, names_with_commas(PRESETS))
+    complete_with(out, folders)
     arguments = parser.parse_args(argv)
     return run_command(lambda: _study(arguments))
 

@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import OneLineParser, nonempty_path, run_command, shell_word
+from keras_pendulum.completion import complete_with, folders, names, weights_files
 from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.display import require_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
+from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 from keras_pendulum.train.progress_bar import can_draw_bar, make_progress
 
@@ -35,11 +37,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         description="Train a DQN on the pendulum or on CartPole, and evaluate it.",
         epilog="Ctrl-C saves a checkpoint; --resume continues from it.",
     )
-    parser.add_argument("--preset", type=nonempty_path, help=f"{', '.join(PRESETS)} [reference]")
-    parser.add_argument(
+    preset_flag = parser.add_argument(
+        "--preset", type=nonempty_path, help=f"{', '.join(PRESETS)} [reference]"
+    )
+    init_flag = parser.add_argument(
         "--init", type=nonempty_path, metavar="FILE.h5", help="start from these weights"
     )
-    parser.add_argument(
+    out_flag = parser.add_argument(
         "--out", type=nonempty_path, metavar="DIR", help="folder of the run [runs/PRESET-seedN]"
     )
     rerun = parser.add_mutually_exclusive_group()
@@ -55,6 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--tensorboard", action="store_true", help="write DIR/tensorboard (extra `tensorboard`)"
     )
     add_config_flags(parser)
+    complete_with(preset_flag, names(PRESETS))
+    complete_with(init_flag, weights_files(shipped_names))
+    complete_with(out_flag, folders)
     arguments = parser.parse_args(argv)
     return run_command(lambda: _train(arguments))
 

@@ -44,34 +44,6 @@ def test_help_imports_no_heavy_package(name: str) -> None:
     assert "usage: python -m keras_pendulum." in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("typed", "offered"),
-    [
-        ("train --pres", {"--preset"}),
-        ("train --loss ", {"squared", "huber"}),
-        ("evaluate --gi", {"--gif"}),
-        ("play --ag", {"--against"}),
-        ("page --o", {"--out", "--open"}),
-    ],
-)
-def test_shell_completes_flags(typed: str, offered: set[str], tmp_path: Path) -> None:
-    # The variables that argcomplete's shell functions set.
-    line = f"python -m keras_pendulum.{typed}"
-    name = typed.split()[0]
-    file = tmp_path / "completions"
-    variables = {
-        "_ARGCOMPLETE": "3",
-        "_ARGCOMPLETE_IFS": "\n",
-        "_ARGCOMPLETE_STDOUT_FILENAME": str(file),
-        "COMP_LINE": line,
-        "COMP_POINT": str(len(line)),
-    }
-    subprocess.run(command_line(name), env=os.environ | variables, capture_output=True, check=True)
-    assert {word.strip() for word in file.read_text().split("\n")} == offered
-    source = (Path(kp.__file__).parent / name / "__main__.py").read_text("utf-8")
-    assert "PYTHON_ARGCOMPLETE_OK" in source[:1024]  # the shell looks for it
-
-
 def test_every_setting_is_a_flag_with_a_help_text() -> None:
     done = subprocess.run(
         command_line("train", "--help-all"),

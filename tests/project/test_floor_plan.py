@@ -16,7 +16,7 @@ ROOMS = (
     *("study", "train", "play", "page", "evaluate", "optimum"),
     *("storage", "dqn", "config", "environments"),
 )
-WITHOUT_ROOM = ("cli", "display", "tensorflow_setup", "history", "version", "errors")
+WITHOUT_ROOM = ("cli", "completion", "display", "tensorflow_setup", "history", "version", "errors")
 ORDER = (*ROOMS, *WITHOUT_ROOM)
 
 
