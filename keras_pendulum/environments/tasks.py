@@ -42,6 +42,11 @@ TASKS = {
 }
 
 
+def task_name(environment: str, gravity: float | None) -> str:
+    """Returns the environment and its gravity; regrets of different tasks cannot be compared."""
+    return environment if gravity is None else f"{environment}, g = {gravity:g}"
+
+
 def make_environment(
     environment: str,
     gravity: float | None,

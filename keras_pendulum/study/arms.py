@@ -9,6 +9,7 @@ from typing import Any
 
 from keras_pendulum.config.config import Config, parse_setting
 from keras_pendulum.config.presets import preset
+from keras_pendulum.environments.tasks import task_name
 from keras_pendulum.errors import ConfigError
 
 # The defects of `original` that these settings fix. The default study fixes them first.
@@ -46,8 +47,7 @@ class Arm:
     @property
     def task(self) -> str:
         """Environment and gravity; regrets of different tasks cannot be compared."""
-        gravity = "" if self.config.gravity is None else f", g = {self.config.gravity:g}"
-        return self.config.environment + gravity
+        return task_name(self.config.environment, self.config.gravity)
 
 
 def default_arms() -> list[Arm]:

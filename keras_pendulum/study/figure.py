@@ -5,10 +5,11 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from keras_pendulum.compare.curve_style import CurveStyle, curve_style
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.study.job import EPISODES_PER_POINT, RunResult
 from keras_pendulum.study.statistics import curve_band
@@ -17,20 +18,7 @@ from keras_pendulum.study.table import Row
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_Style = tuple[str, Any, str]  # colour, line, marker
-# The colours of Okabe and Ito, with brown for their yellow, which is faint on white. Each has its
-# own line and marker, so that the arms can be distinguished without colour.
-STYLES: tuple[_Style, ...] = (
-    ("black", "-", "s"),
-    ("#0072B2", "-", "o"),
-    ("#D55E00", "--", "^"),
-    ("#009E73", "-.", "v"),
-    ("#CC79A7", ":", "D"),
-    ("#E69F00", (0, (5, 1, 1, 1, 1, 1)), "P"),
-    ("#56B4E9", (0, (1, 1)), "X"),
-    ("#8C510A", (0, (8, 2)), "*"),
-)
-_STYLE_WITHOUT_CURVE: _Style = ("0.45", "-", "o")
+_STYLE_WITHOUT_CURVE: CurveStyle = ("0.45", "-", "o")
 
 
 def draw_study(rows: Sequence[Row], results: Mapping[str, Sequence[RunResult]]) -> bytes:
@@ -46,7 +34,7 @@ def draw_study(rows: Sequence[Row], results: Mapping[str, Sequence[RunResult]]) 
     from matplotlib.figure import Figure
 
     with_curve = [row for row in rows if row.arm.has_curve]
-    styles = {row.arm.name: _style(index) for index, row in enumerate(with_curve)}
+    styles = {row.arm.name: curve_style(index) for index, row in enumerate(with_curve)}
     tasks = list(dict.fromkeys(row.arm.task for row in with_curve))
     # A panel needs 4 inches for its axes and title, and a line for each curve in its legend.
     height = max(6.5, 1.5 + 0.55 * len(rows), 4.0 * len(tasks) + 0.2 * len(with_curve))
@@ -61,15 +49,7 @@ def draw_study(rows: Sequence[Row], results: Mapping[str, Sequence[RunResult]]) 
     return stream.getvalue()
 
 
-def _style(index: int) -> _Style:
-    """Returns the style of the curve `index`; a repeated colour has another line and marker."""
-    color, _, _ = STYLES[index % len(STYLES)]
-    # With a shift of three, a repeated colour gets a line that looks different from its first one.
-    _, line, marker = STYLES[(index + index // len(STYLES) * 3) % len(STYLES)]
-    return color, line, marker
-
-
-def _draw_regrets(axes: Axes, rows: Sequence[Row], styles: Mapping[str, _Style]) -> None:
+def _draw_regrets(axes: Axes, rows: Sequence[Row], styles: Mapping[str, CurveStyle]) -> None:
     for y, row in enumerate(rows):
         color, _, marker = styles.get(row.arm.name, _STYLE_WITHOUT_CURVE)
         axes.plot(row.regrets, [y + 0.22] * len(row.regrets), "|", color="0.6", markersize=7)
@@ -102,7 +82,7 @@ def _draw_curves(
     axes: Axes,
     rows: Sequence[Row],
     results: Mapping[str, Sequence[RunResult]],
-    styles: Mapping[str, _Style],
+    styles: Mapping[str, CurveStyle],
 ) -> None:
     task = TASKS[rows[0].arm.config.environment]
     for row in rows:

@@ -119,6 +119,16 @@ def load_config(path: str | os.PathLike[str]) -> Config:
         return _config(_read_json_state(file, path), path)
 
 
+def load_history(path: str | os.PathLike[str]) -> tuple[Config, list[EpisodeRecord]]:
+    """Returns the settings and the history of the run in a checkpoint.
+
+    Raises as `load_checkpoint` does.
+    """
+    with open_h5(path) as file:
+        config = _config(_read_json_state(file, path), path)
+        return config, [_record(row) for row in file.read("run/history", finite=False)]
+
+
 def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool = False) -> Run:
     """Returns the run in a checkpoint, ready to continue.
 

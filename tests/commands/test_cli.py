@@ -50,7 +50,9 @@ def test_closed_pipe_of_windows_ends_a_command_without_a_message(
     assert capfd.readouterr().err == ""
 
 
-@pytest.mark.parametrize("name", ["train", "evaluate", "optimum", "page", "play", "study"])
+@pytest.mark.parametrize(
+    "name", ["train", "evaluate", "optimum", "page", "play", "compare", "study"]
+)
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
 def test_help_is_printed_in_any_code_page(name: str, encoding: str) -> None:
     done = subprocess.run(

@@ -70,6 +70,7 @@ def completions(line: str, folder: Path) -> set[str]:
         (f"{MODULE}.play --against sw", {"swingup"}),
         (f"{MODULE}.page --o", {"--out", "--open"}),
         (f"{MODULE}.page m", {"mine.h5", "model.keras"}),
+        (f"{MODULE}.compare runs/", {"runs/one/"}),
         (f"{MODULE}.study --presets reference,w", {"reference,walkthrough"}),
     ],
 )
@@ -79,7 +80,7 @@ def test_shell_completes_commands_flags_and_values(
     assert completions(line, folder) == offered
 
 
-@pytest.mark.parametrize("name", ["train", "evaluate", "play", "page", "study"])
+@pytest.mark.parametrize("name", ["train", "evaluate", "play", "page", "compare", "study"])
 def test_shell_finds_the_mark_of_each_command(name: str) -> None:
     source = (PACKAGE / name / "__main__.py").read_text(encoding="utf-8")
     assert "PYTHON_ARGCOMPLETE_OK" in source[:1024]

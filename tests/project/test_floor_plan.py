@@ -13,7 +13,7 @@ import keras_pendulum
 PACKAGE = Path(keras_pendulum.__file__).parent
 # From the top down. The modules at the end have no room and may be imported from everywhere.
 ROOMS = (
-    *("study", "train", "play", "page", "evaluate", "optimum"),
+    *("study", "compare", "train", "play", "page", "evaluate", "optimum"),
     *("storage", "dqn", "config", "environments"),
 )
 WITHOUT_ROOM = ("cli", "completion", "display", "tensorflow_setup", "history", "version", "errors")

@@ -119,6 +119,9 @@ def test_run_is_trained_resumed_replaced_and_evaluated(windows: Windows) -> None
     windows.output("train", *words, "--episodes", "1", "--overwrite")
     assert not (run / "tensorboard").exists()
     assert (run / "history.csv").read_bytes().count(b"\n") == 2
+    table = windows.output("compare", run.name, "--out", "runs.png")
+    assert "| my run | original |    0 |        1 |" in table
+    assert (windows.folder / "runs.png").read_bytes().startswith(b"\x89PNG")
     weights = run / "pendulum_weight.h5"
     score = windows.output("evaluate", weights, "--episodes", "2", "--gif", "film.gif")
     assert "g = 1" in score

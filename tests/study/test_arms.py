@@ -8,9 +8,9 @@ from itertools import pairwise
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.compare.curve_style import STYLES
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.study.arms import default_arms, own_arms
-from keras_pendulum.study.figure import STYLES
 
 
 def test_default_study_goes_from_original_to_reference_one_change_at_a_time() -> None:

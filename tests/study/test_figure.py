@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from keras_pendulum.study.arms import own_arms
-from keras_pendulum.study.figure import _style, draw_study
+from keras_pendulum.study.figure import draw_study
 from keras_pendulum.study.job import RunResult
 from keras_pendulum.study.table import make_rows
 
@@ -52,8 +52,6 @@ def test_more_arms_than_colours_have_different_curves(
     assert [len(lines) for lines in drawn.values()] == [12, 1]
     lines = [line for panel in drawn.values() for line in panel.values()]
     assert len({(line.get_color(), line.get_marker()) for line in lines}) == 13
-    dashes = [(color, dashes) for color, dashes, _ in map(_style, range(24))]
-    assert len(set(dashes)) == 24
 
 
 def test_axis_labels_are_visible_beside_long_legends(

@@ -1,0 +1,158 @@
+"""The command `compare`: its table, its figure, and the folders that it refuses."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import matplotlib.image
+import numpy as np
+import pytest
+from conftest import Refusal
+
+import keras_pendulum as kp
+from keras_pendulum.compare import __main__ as compare
+from keras_pendulum.train.checkpoint import load_history
+
+
+def make_run(path: Path, preset: str, **settings: object) -> kp.TrainingResult:
+    """Makes a run of 3 episodes and leaves its folder without a picture, as an interrupted run."""
+    config = kp.preset(preset, episodes=4, hidden_units=(8, 8), **settings)
+    episodes = iter(range(3))
+    return kp.train_dqn(config, path, should_stop=lambda: next(episodes) == 2)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Runs of two tasks, and a copy of one in a folder of the same name."""
+    folder = tmp_path_factory.mktemp("runs")
+    make_run(folder / "one", "original", seed=1)
+    make_run(folder / "two", "reference", seed=2, discount=0.5, save_every=2)
+    make_run(folder / "pole", "cartpole-original")
+    make_run(folder / "strong", "reference", gravity=10.0)
+    return folder
+
+
+def test_table_has_settings_and_score_of_each_run(
+    runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "figure.png"
+    assert compare.main([str(runs / "two"), str(runs / "one"), "--out", str(out)]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    scores = {
+        name: kp.evaluate_policy(kp.load_weights(runs / name / "pendulum_weight.h5"))
+        for name in ("one", "two")
+    }
+    assert shown[0] == (
+        "Greedy on 100 fixed starts, Pendulum-v1, g = 1: best possible mean return "
+        f"{scores['one'].optimal_mean_return:.2f}"
+    )
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in shown[4:6]]
+    assert rows == [
+        [
+            *(name, preset, seed, "3 of 4", "0"),
+            *(f"{scores[name].mean_return:.2f}", f"{scores[name].regret:.2f}", changes),
+        ]
+        for name, preset, seed, changes in (
+            ("two", "reference", "2", "hidden_units=8,8 discount=0.5"),
+            ("one", "original", "1", "hidden_units=8,8"),
+        )
+    ]
+    assert len({len(line) for line in shown[2:6]}) == 1  # aligned
+    assert shown[-1] == f"Learning curves and regrets: {out}"
+    picture = matplotlib.image.imread(io.BytesIO(out.read_bytes()))
+    assert picture.shape[1] == 1200
+    assert compare.main([str(runs / "one"), "--out", str(out)]) == 0  # replaces the picture
+
+
+def test_one_run_of_cartpole_is_compared_with_the_optimum(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert compare.main([str(runs / "pole")]) == 0
+    assert "CartPole-v1: best possible mean return 500.00" in capsys.readouterr().out
+    assert (tmp_path / "comparison.png").exists()
+
+
+def test_runs_of_other_tasks_are_refused_by_name(runs: Path, refusal: Refusal) -> None:
+    folders = [str(runs / name) for name in ("one", "pole", "two", "strong")]
+    line = refusal(compare.main, folders)
+    assert f"{runs / 'pole'} (CartPole-v1), {runs / 'strong'} (Pendulum-v1, g = 10): " in line
+    assert f"another task than that of {runs / 'one'} (Pendulum-v1, g = 1)" in line
+    assert str(runs / "two") not in line
+
+
+def test_wrong_folders_and_files_are_one_error_line(runs: Path, refusal: Refusal) -> None:
+    one = str(runs / "one")
+    for words, message in (
+        ([], "the following arguments are required: RUN_FOLDER"),
+        ([""], "the name is empty"),
+        (["missing"], "missing: no such folder"),
+        (["text.h5"], "text.h5: a file; expected the folder of a run"),
+        ([str(runs)], "holds no run"),
+        ([one, f"{one}/../one"], "are the same folder: name it once"),
+        ([one, "--out", "text.h5"], "text.h5 holds something else than a PNG"),
+        ([one, "--out", ""], "the name is empty"),
+        ([one, "--out", "no/such/folder.png"], "cannot write no/such/folder.png"),
+        ([one, "--ot", "a.png"], "unrecognized arguments: --ot a.png; did you mean --out?"),
+    ):
+        assert message in refusal(compare.main, words)
+
+
+def changed(change: Callable[[h5py.File], object]) -> Callable[[Path], None]:
+    """Returns a function that changes the content of a checkpoint and removes its checksum."""
+
+    def apply(file: Path) -> None:
+        with h5py.File(file, "r+") as content:
+            change(content)
+
+    return apply
+
+
+def set_history(rows: object) -> Callable[[h5py.File], None]:
+    def change(content: h5py.File) -> None:
+        del content["run/history"]
+        content["run/history"] = rows
+
+    return change
+
+
+def flip_a_bit(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (flip_a_bit, "its SHA-256 differs from the recorded one"),
+        (lambda file: file.write_bytes(file.read_bytes()[:5000]), "pendulum_weight.h5: "),
+        (lambda file: file.write_text("not weights"), "not an HDF5 file"),
+        (changed(set_history(np.ones((3, 5)))), "the file is damaged"),
+        (changed(set_history(np.ones(8))), "the file is damaged"),
+        (changed(set_history(np.full((3, 8), np.nan))), "the file is damaged"),
+        (changed(set_history([[0, 1, np.inf, 1, 1, 1, 1, 1.0]])), "a return is not finite"),
+        (changed(set_history(np.empty((0, 8)))), "no finished episode yet"),
+        (changed(lambda content: content.pop("run/history")), "has no array run/history"),
+        (changed(lambda content: content.pop("run")), "holds weights without a run"),
+    ],
+)
+def test_damaged_run_is_one_error_line(
+    damage: Callable[[Path], None], message: str, tmp_path: Path, runs: Path, refusal: Refusal
+) -> None:
+    run = tmp_path.parent / f"{tmp_path.name}-run"
+    run.mkdir()
+    file = run / "pendulum_weight.h5"
+    file.write_bytes((runs / "one" / file.name).read_bytes())
+    damage(file)
+    assert message in refusal(compare.main, [str(runs / "one"), str(run)])
+
+
+def test_history_of_a_checkpoint_is_that_of_the_run(tmp_path: Path) -> None:
+    result = make_run(tmp_path, "original")
+    config, history = load_history(tmp_path / "pendulum_weight.h5")
+    assert config == kp.preset("original", episodes=4, hidden_units=(8, 8))
+    assert [record[:4] for record in history] == [record[:4] for record in result.history]

@@ -1,0 +1,134 @@
+"""The figure of compared runs: the right numbers, and no text that covers another."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+import keras_pendulum as kp
+from keras_pendulum.compare.figure import draw_comparison, trailing_mean
+from keras_pendulum.compare.runs import ComparedRun, best_possible
+from keras_pendulum.history import EpisodeRecord
+
+
+def make_runs(
+    regrets: Sequence[float], names: Sequence[str] = (), preset: str = "reference"
+) -> list[ComparedRun]:
+    """Returns runs of 40 episodes; episode i of the run n has the average reward -i - n."""
+    config = kp.preset(preset)
+    return [
+        ComparedRun(
+            names[n] if names else f"run{n}",
+            config,
+            [
+                EpisodeRecord(i, -i - n, 100.0 + i, 0.5, math.nan, 200 * (i + 1), i, 0.1)
+                for i in range(40)
+            ],
+            kp.Score("Pendulum-v1", 1.0, np.array([-regret]), np.array([0.0])),
+        )
+        for n, regret in enumerate(regrets)
+    ]
+
+
+def drawn(
+    runs: Sequence[ComparedRun], optimum: float | None, monkeypatch: pytest.MonkeyPatch
+) -> Figure:
+    """Returns the figure; each warning of Matplotlib is an error."""
+    figures: list[Figure] = []
+    monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: figures.append(self))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        draw_comparison(runs, optimum)
+        figures[0].draw_without_rendering()
+    return figures[0]
+
+
+def test_curves_are_the_means_over_the_last_10_episodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    curves, regrets = drawn(make_runs([1.0, 2.0]), -0.2, monkeypatch).axes
+    for n, line in enumerate(curves.lines[:2]):
+        assert np.asarray(line.get_xdata()).tolist() == [200 * (i + 1) for i in range(40)]
+        assert np.asarray(line.get_ydata())[[0, 1, 39]].tolist() == [-n, -0.5 - n, -34.5 - n]
+    assert np.asarray(curves.lines[2].get_ydata()).tolist() == [-0.2, -0.2]
+    assert [text.get_text() for text in regrets.texts] == ["1", "2"]
+    assert [np.asarray(line.get_xdata()).tolist() for line in regrets.lines[:2]] == [[1.0], [2.0]]
+
+
+def test_curve_of_cartpole_shows_returns(monkeypatch: pytest.MonkeyPatch) -> None:
+    curves = drawn(make_runs([1.0], preset="cartpole"), 500.0, monkeypatch).axes[0]
+    assert np.asarray(curves.lines[0].get_ydata())[1] == 100.5
+    assert curves.get_ylabel() == "Return (steps)"
+
+
+@pytest.mark.parametrize(
+    ("regrets", "optimum"),
+    [
+        ([1.87], -0.2),
+        ([0.0, 0.0], None),
+        ([-0.01, 0.3], -0.2),
+        ([1.87, 8.2, 986.6, 1753.1], -0.2),
+        ([-5.0, 1200.0], None),
+        ([500.0, 900.0], -0.2),
+        ([float(n) for n in range(20)], -0.2),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("name", ["run", "a very long name of a run, longer than two lines of it "])
+def test_no_text_covers_another_or_leaves_the_picture(
+    regrets: list[float], optimum: float | None, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = make_runs(regrets, [f"{name}{n}" for n in range(len(regrets))])
+    figure = drawn(runs, optimum, monkeypatch)
+    _, regret_axes = figure.axes
+    legend = figure.legends[0].get_texts()
+    texts: list[Text] = [*legend, *regret_axes.texts]
+    for axes in figure.axes:
+        texts += [axes.title, axes.xaxis.label, axes.yaxis.label]
+        texts += [*tick_labels(axes.xaxis), *tick_labels(axes.yaxis)]
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text.get_text()]
+    for text, box in boxes:
+        assert box.x0 >= 0 and box.y0 >= 0, text
+        assert box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1, text
+    for (first, one), (second, other) in itertools.combinations(boxes, 2):
+        assert not one.padded(-1).overlaps(other.padded(-1)), (first, second)
+    assert len(legend) == len(runs) + (optimum is not None)
+    for number in regret_axes.texts:
+        assert number.get_window_extent().x1 <= regret_axes.bbox.x1
+
+
+def tick_labels(axis: Axis) -> list[Text]:
+    """Returns the labels that are drawn: Matplotlib keeps those of ticks outside the axes."""
+    low, high = sorted(axis.get_view_interval())
+    places = zip(axis.get_majorticklocs(), axis.get_ticklabels(), strict=True)
+    return [label for place, label in places if low <= place <= high]
+
+
+def test_names_are_drawn_letter_by_letter(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Matplotlib would refuse the second one as a formula.
+    names = ["_hidden", r"$\nonsense$", "100 % & \\n", "größe θ"]
+    figure = drawn(make_runs([1.0] * 4, names), None, monkeypatch)
+    shown = [text.get_text().replace(r"\$", "$") for text in figure.legends[0].get_texts()]
+    assert shown == names
+
+
+def test_trailing_mean_has_fewer_values_at_the_start() -> None:
+    assert trailing_mean([4.0, 2.0, 0.0, 8.0], 2).tolist() == [4.0, 3.0, 1.0, 4.0]
+
+
+def test_optimum_is_on_the_scale_of_the_curves() -> None:
+    (run,) = make_runs([1.0])
+    found = best_possible([run])
+    assert found == pytest.approx(float(kp.optimal_return(1.0, range(1000)).mean()) / 200)
+    (pole,) = make_runs([1.0], preset="cartpole")
+    assert best_possible([pole]) == 500.0
+    (short,) = make_runs([1.0], preset="swingup")
+    assert best_possible([run, short]) is None
+    config = kp.preset("reference", max_episode_steps=300)
+    assert best_possible([ComparedRun("long", config, run.history, run.score)]) is None
