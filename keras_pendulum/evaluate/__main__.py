@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from keras_pendulum.dqn.network import DQN
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.evaluate") -> int:
     """Runs the command; returns its exit status."""
     parser = OneLineParser(
-        prog="python -m keras_pendulum.evaluate",
+        prog=prog,
         description="Evaluate the policy in a weights file and compare it with the best possible "
         "return.",
     )

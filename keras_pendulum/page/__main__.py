@@ -20,10 +20,10 @@ from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 _HEAD = b"<!doctype html>\n<!-- keras_pendulum page:"  # the first bytes of every page
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.page") -> int:
     """Writes the page as the command line says; returns the exit status."""
     parser = OneLineParser(
-        prog="python -m keras_pendulum.page",
+        prog=prog,
         description="Write a page that runs in a browser and shows the network of a weights file.",
     )
     weights = parser.add_argument(

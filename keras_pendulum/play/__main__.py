@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from keras_pendulum.play.episode import Policy
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.play") -> int:
     """Plays the game as the command line says; returns the exit status."""
     parser = OneLineParser(
-        prog="python -m keras_pendulum.play",
+        prog=prog,
         description="Drive the pendulum by hand; --against then shows a policy on the same start.",
         epilog="Keys: j or left -2 N·m, l or right +2, k or down 0; r restarts, ESC leaves.",
     )

@@ -31,10 +31,10 @@ _MAX_SEEDS = 100_000
 _MAX_WORKERS = 512
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.study") -> int:
     """Parses the command line and makes the study; returns the exit status."""
     parser = OneLineParser(
-        prog="python -m keras_pendulum.study",
+        prog=prog,
         description="Train variants of the agent with many seeds, and compare their regrets with "
         "confidence intervals. Without --presets and --arm: from `original` to `reference` one "
         "change at a time, `reference` without each change, and with index-truncation.",

@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from keras_pendulum.train.train_dqn import TrainingResult
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.train") -> int:
     """Trains as the command line says; returns the exit status."""
     parser = OneLineParser(
         help_all=True,
-        prog="python -m keras_pendulum.train",
+        prog=prog,
         description="Train a DQN on the pendulum or on CartPole, and evaluate it.",
         epilog="Ctrl-C saves a checkpoint; --resume continues from it.",
     )

@@ -27,7 +27,9 @@ from keras_pendulum.train.run import Run
 RECORDED = DATA / "pendulum_weight.keras2.h5"
 
 
-@pytest.mark.parametrize("name", [".train", ".evaluate", ".play", ".page", ".compare", ".study"])
+@pytest.mark.parametrize(
+    "name", ["", ".train", ".evaluate", ".play", ".page", ".compare", ".study"]
+)
 def test_help_imports_no_heavy_package(name: str) -> None:
     code = (
         "import runpy, sys\n"

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.__main__ import COMMANDS
 from keras_pendulum.completion import folders, names, names_with_commas, weights_files
 from keras_pendulum.config.presets import PRESETS
 
@@ -31,7 +32,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def completions(line: str, folder: Path) -> set[str]:
     """Returns what the shell offers at the end of a line."""
-    program = line.split()[:3]
+    program = line.split()[:3] if line.startswith("python") else line.split()[:1]
     file = folder / "completions.txt"
     variables = {  # those that argcomplete's shell functions set
         "_ARGCOMPLETE": str(len(program)),
@@ -40,8 +41,9 @@ def completions(line: str, folder: Path) -> set[str]:
         "COMP_LINE": line,
         "COMP_POINT": str(len(line)),
     }
+    words = ["-m", program[2]] if len(program) == 3 else ["-c", SCRIPT]
     subprocess.run(
-        [sys.executable, *program[1:]],
+        [sys.executable, *words],
         cwd=folder,
         env=os.environ | variables,
         capture_output=True,
@@ -50,6 +52,10 @@ def completions(line: str, folder: Path) -> set[str]:
     offered = {word.strip() for word in file.read_text(encoding="utf-8").split("\n")}
     file.unlink()
     return offered
+
+
+# What pip's script `keras-pendulum` contains.
+SCRIPT = "import sys; from keras_pendulum.__main__ import main; sys.exit(main())"
 
 
 @pytest.mark.parametrize(
@@ -72,6 +78,12 @@ def completions(line: str, folder: Path) -> set[str]:
         (f"{MODULE}.page m", {"mine.h5", "model.keras"}),
         (f"{MODULE}.compare runs/", {"runs/one/"}),
         (f"{MODULE}.study --presets reference,w", {"reference,walkthrough"}),
+        (f"{MODULE} tr", {"train"}),
+        (f"{MODULE} train --preset w", {"walkthrough"}),
+        ("keras-pendulum ", {*COMMANDS, "-h", "--help", "--version"}),
+        ("keras-pendulum --v", {"--version"}),
+        ("keras-pendulum evaluate orig", {"original"}),
+        ("keras-pendulum train --preset cartpole --los", {"--loss"}),
     ],
 )
 def test_shell_completes_commands_flags_and_values(
@@ -80,7 +92,7 @@ def test_shell_completes_commands_flags_and_values(
     assert completions(line, folder) == offered
 
 
-@pytest.mark.parametrize("name", ["train", "evaluate", "play", "page", "compare", "study"])
+@pytest.mark.parametrize("name", ["", *COMMANDS])
 def test_shell_finds_the_mark_of_each_command(name: str) -> None:
     source = (PACKAGE / name / "__main__.py").read_text(encoding="utf-8")
     assert "PYTHON_ARGCOMPLETE_OK" in source[:1024]

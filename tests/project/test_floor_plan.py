@@ -11,13 +11,14 @@ import pytest
 import keras_pendulum
 
 PACKAGE = Path(keras_pendulum.__file__).parent
-# From the top down. The modules at the end have no room and may be imported from everywhere.
+# From the top down. `__main__` starts the commands. The modules at the end have no room and may be
+# imported from everywhere.
 ROOMS = (
     *("study", "compare", "train", "play", "page", "evaluate", "optimum"),
     *("storage", "dqn", "config", "environments"),
 )
 WITHOUT_ROOM = ("cli", "completion", "display", "tensorflow_setup", "history", "version", "errors")
-ORDER = (*ROOMS, *WITHOUT_ROOM)
+ORDER = ("__main__", *ROOMS, *WITHOUT_ROOM)
 
 
 def imported_modules(path: Path, package: Path = PACKAGE) -> Iterator[str]:
@@ -90,7 +91,7 @@ def test_every_module_has_a_place_in_the_floor_plan() -> None:
     rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
     assert rooms == set(ROOMS)
     without_room = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
-    assert without_room == set(WITHOUT_ROOM)
+    assert without_room == {"__main__", *WITHOUT_ROOM}
 
 
 def test_rooms_have_an_empty_init() -> None:
@@ -104,6 +105,11 @@ def test_rooms_have_an_empty_init() -> None:
             "dqn/agent.py",
             "from keras_pendulum.train.loop import train_episodes",
             "dqn/agent.py imports train.loop, which is above it",
+        ),
+        (
+            "cli.py",
+            "from keras_pendulum.__main__ import COMMANDS",
+            "cli.py imports __main__, which is above it",
         ),
         (
             "errors.py",

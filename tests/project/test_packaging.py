@@ -151,6 +151,20 @@ def test_checkout_evaluates_its_own_weights(checkout_score: dict[str, Any]) -> N
     assert Path(checkout_score["weights"]) == ROOT / "weights" / "reference.h5"
 
 
+def test_installed_script_lists_the_shipped_weights(built: Built, tmp_path: Path) -> None:
+    target, empty = tmp_path / "target", tmp_path / "empty"
+    empty.mkdir()
+    pip_install(sys.executable, empty, "--no-deps", "--no-index", "--target", target, built.wheel)
+    script = shutil.which("keras-pendulum", path=target / "bin")
+    assert script is not None
+    shown = succeed([script], empty, "no list", PYTHONPATH=str(target))
+    assert shown.startswith("usage: keras-pendulum ")
+    for path in ROOT.glob("weights/*.h5"):
+        assert re.search(rf"^  {path.stem} .* -?\d+\.\d\d$", shown, re.MULTILINE)
+    printed = succeed([script, "evaluate", "--help"], empty, "no help", PYTHONPATH=str(target))
+    assert printed.startswith("usage: keras-pendulum evaluate ")
+
+
 def same_score(score: dict[str, Any], other: dict[str, Any]) -> bool:
     return bool(score["mean_return"] == pytest.approx(other["mean_return"], rel=1e-6, abs=0.01))
 

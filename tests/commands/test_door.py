@@ -1,0 +1,127 @@
+"""The command `keras-pendulum`: what it lists, and the commands that it runs."""
+
+from __future__ import annotations
+
+import configparser
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT, assert_same
+
+import keras_pendulum as kp
+from keras_pendulum import __main__ as door
+from keras_pendulum.config.presets import PRESETS
+from keras_pendulum.storage.weights import recorded_return
+from keras_pendulum.train import __main__ as train
+from keras_pendulum.train.checkpoint import load_history
+
+PACKAGE = Path(kp.__file__).parent
+
+
+@pytest.fixture(params=["keras-pendulum", "python -m keras_pendulum"])
+def program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The words that a user types, with `sys.argv` as they set it."""
+    as_module = request.param.startswith("python")
+    path = PACKAGE / "__main__.py" if as_module else Path(sys.prefix) / "bin" / "keras-pendulum"
+    monkeypatch.setattr(sys, "argv", [str(path)])
+    return str(request.param)
+
+
+@pytest.mark.parametrize("words", [[], ["--help"], ["-h"]])
+def test_commands_presets_and_shipped_weights_are_listed(
+    words: list[str], program: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        assert door.main(words) == 0
+    except SystemExit as exit:
+        assert exit.code == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(f"usage: {program} [COMMAND …]\n")
+    assert max(map(len, shown.splitlines())) <= 80
+    for name, text in door.COMMANDS.items():
+        assert re.search(rf"^  {name} +{re.escape(text)}$", shown, re.MULTILINE)
+    for name, text in door.PRESET_LINES.items():
+        assert re.search(rf"^  {name} +\S.*  {re.escape(text)}$", shown, re.MULTILINE)
+    assert re.search(r"^  swingup +Pendulum-v1, g = 10 ", shown, re.MULTILINE)
+    for path in (ROOT / "weights").glob("*.h5"):
+        line = rf"^  {path.stem} +\S.* {recorded_return(path):.2f}$"
+        assert re.search(line, shown, re.MULTILINE), line
+    assert f"keras_pendulum {kp.__version__}" in shown
+
+
+def test_every_command_and_every_preset_is_listed() -> None:
+    rooms = {path.parent.name for path in PACKAGE.glob("*/__main__.py")}
+    assert rooms - {"optimum"} == set(door.COMMANDS)
+    assert list(door.PRESET_LINES) == list(PRESETS)
+    assert {path.stem for path in (ROOT / "weights").glob("*.h5")} <= set(PRESETS)
+
+
+def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        door.main(["--version"])
+    assert capsys.readouterr().out == f"keras_pendulum {kp.__version__}\n"
+
+
+@pytest.mark.parametrize("name", door.COMMANDS)
+def test_usage_of_a_command_is_what_the_user_typed(
+    name: str, program: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        door.main([name, "--help"])
+    assert capsys.readouterr().out.startswith(f"usage: {program} {name} ")
+
+
+def test_command_behind_the_door_equals_its_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--seed", "3"]
+    assert door.main(["train", *words, "--out", "door"]) == 0
+    through_door = capsys.readouterr().out
+    assert train.main([*words, "--out", "module"]) == 0
+    lines = capsys.readouterr().out.replace("module", "door").splitlines()
+    assert without_seconds(through_door.splitlines()) == without_seconds(lines)
+    first, second = (
+        kp.TrainingResult(kp.load_weights(file), load_history(file)[1], True)
+        for file in sorted(tmp_path.glob("*/pendulum_weight.h5"))
+    )
+    assert_same(first, second)
+
+
+def without_seconds(lines: list[str]) -> list[str]:
+    return [re.sub(r"this took [\d.]+ s", "", line) for line in lines]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["evalute", "x.h5"], "unknown command 'evalute'; expected one of train, evaluate, "),
+        (["evalute", "x.h5"], "; did you mean evaluate?"),
+        (["Train"], "; did you mean train?"),
+        (["trains", "--episodes", "5"], "; did you mean train?"),
+        (["reward"], "study\n"),
+        ([""], "unknown command ''"),
+        (["\x1b[31m\n"], r"unknown command '\x1b[31m\n'"),
+        (["--verison"], "unrecognized arguments: --verison; did you mean --version?"),
+        (["train", "--sed", "1"], "unrecognized arguments: --sed 1; did you mean --seed?"),
+    ],
+)
+def test_mistyped_command_is_one_error_line_with_the_similar_one(
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        door.main(words)
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("error: ")
+    assert printed.err.count("\n") == 1
+    assert message in printed.err
+
+
+def test_script_of_the_package_is_this_command() -> None:
+    config = configparser.ConfigParser()
+    config.read(ROOT / "setup.cfg", encoding="utf-8")
+    scripts = config["options.entry_points"]["console_scripts"].split("\n")
+    assert scripts == ["", "keras-pendulum = keras_pendulum.__main__:main"]
