@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from keras_pendulum.errors import WeightsError
 from keras_pendulum.storage.shipped_weights import shipped_folders
 
 
-def find_weights(name: str) -> Path:
+def find_weights(name: str | os.PathLike[str]) -> Path:
     """Returns the path of a weights file: `name` itself, or the shipped file `name`(.h5).
 
     Raises WeightsError when neither exists.
     """
+    name = os.fspath(name)
     path = Path(name)
     try:
         if path.is_file():

@@ -25,6 +25,7 @@ from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import ConfigError, UserError, WeightsError, require_type
 from keras_pendulum.storage.checksum import write_with_checksum
+from keras_pendulum.storage.find_weights import find_weights
 from keras_pendulum.storage.keras_h5 import Layer, read_layers, write_layers
 from keras_pendulum.storage.model_config import read_model
 from keras_pendulum.storage.quarantine import H5File, open_h5
@@ -123,7 +124,7 @@ def load_weights(path: str | os.PathLike[str], activation: str | None = None) ->
     and in a whole model the activations.
 
     Args:
-        path: the file.
+        path: the file, or the name of a shipped one.
         activation: tanh, relu or linear, of the hidden layers, for a file that holds weights alone.
             Without it, and without a recorded one, they are tanh, with a warning.
 
@@ -133,7 +134,7 @@ def load_weights(path: str | os.PathLike[str], activation: str | None = None) ->
     require_type("path", path, (str, os.PathLike))
     if activation is not None and activation not in ACTIVATIONS:
         raise ConfigError(f"activation is {activation}, expected {', '.join(ACTIVATIONS)}")
-    name = os.fsdecode(path)
+    name = os.fspath(find_weights(path))
     recorded, provenance, layers = _read(name)
     if recorded is None:
         if activation is None:
