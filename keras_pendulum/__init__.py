@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
     from keras_pendulum.evaluate.evaluation import Score, evaluate_policy
+    from keras_pendulum.evaluate.loaded_policy import Policy, load_policy
     from keras_pendulum.optimum.optimal_return import optimal_return
     from keras_pendulum.storage.find_weights import find_weights
     from keras_pendulum.storage.weights import load_weights, save_weights
@@ -30,6 +31,7 @@ __all__ = [
     "DQN",
     "Config",
     "ConfigError",
+    "Policy",
     "Score",
     "TrainingResult",
     "UserError",
@@ -37,6 +39,7 @@ __all__ = [
     "__version__",
     "evaluate_policy",
     "find_weights",
+    "load_policy",
     "load_weights",
     "optimal_return",
     "preset",
@@ -50,6 +53,7 @@ _MODULES = {
     "dqn.network": ("DQN",),
     "errors": ("ConfigError", "UserError", "WeightsError"),
     "evaluate.evaluation": ("Score", "evaluate_policy"),
+    "evaluate.loaded_policy": ("Policy", "load_policy"),
     "optimum.optimal_return": ("optimal_return",),
     "storage.find_weights": ("find_weights",),
     "storage.weights": ("load_weights", "save_weights"),

@@ -75,8 +75,7 @@ class Agent:
             self._compiled[shape] = steps.get_concrete_function(*tensors)
         losses, weights = self._compiled[shape](*tensors)
         self.policy = GreedyPolicy([each.numpy() for each in weights], self.online.activation)
-        array: NDArray[np.float32] = losses.numpy()
-        return array
+        return losses.numpy()
 
     def _gradient_steps(self, *fields: tf.Tensor) -> tuple[tf.Tensor, list[tf.Tensor]]:
         """Makes the gradient steps of `update`; returns the losses [K] and the online weights."""

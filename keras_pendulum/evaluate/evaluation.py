@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -15,13 +16,12 @@ from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config, validate_setting
 from keras_pendulum.dqn.network import DQN, Provenance
-from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import make_actions
 from keras_pendulum.environments.tasks import TASKS, make_environment, pendulum_starts
 from keras_pendulum.errors import ConfigError, require_type
+from keras_pendulum.evaluate.loaded_policy import Policy, load_policy
 from keras_pendulum.optimum.dynamics import TORQUES, simulate_return
 from keras_pendulum.optimum.optimal_return import USUAL_SEEDS, optimal_return
-from keras_pendulum.storage.weights import require_finite
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Score:
 
 
 def evaluate_policy(
-    network: DQN,
+    agent: DQN | Policy | str | os.PathLike[str],
     episodes: int = 100,
     seed: int = 0,
     *,
@@ -103,29 +103,30 @@ def evaluate_policy(
     """Returns the score of greedy episodes; episode i starts from `reset(seed=seed+i)`.
 
     Args:
-        network: the Q-network; its number of outputs determines the torques.
+        agent: a network, its policy, or the path or shipped name of its weights file.
         episodes: number of episodes.
         seed: seed of the first start.
-        gravity: m/s², for the pendulum; None takes the network's recorded gravity, else 1.
+        gravity: m/s², for the pendulum; None takes the agent's recorded gravity, else 1.
         render_mode: Gymnasium's.
         on_step: called with the environment after each reset and each step.
 
     Raises ConfigError for a number out of range, and for a gravity with CartPole. Raises UserError
-    when a weight is not finite, and TypeError when `network` is no DQN.
+    when a weight is not finite, WeightsError as `load_weights` does, and TypeError for another
+    agent.
     """
-    require_type("network", network, DQN)
-    require_finite(network.get_weights())
+    require_type("agent", agent, (DQN, Policy, str, os.PathLike))
+    if isinstance(agent, (str, os.PathLike)):
+        agent = load_policy(agent)
+    policy = agent if isinstance(agent, Policy) else Policy(agent)
     episodes = validate_setting("episodes", episodes)
     seed = validate_setting("seed", seed)
     validate_setting("seed", seed + episodes - 1)
-    environment = network.provenance.environment
-    gravity = evaluation_gravity(network.provenance, gravity)
-    policy = greedy_policy(network)
-    actions = make_actions(environment, network.action_count)
+    environment = policy.provenance.environment
+    gravity = evaluation_gravity(policy.provenance, gravity)
     seeds = range(seed, seed + episodes)
 
     def act(observation: NDArray[np.float32]) -> Any:
-        return actions.to_env_action(policy.action(observation))
+        return policy.actions.to_env_action(policy.greedy.action(observation))
 
     with contextlib.closing(make_environment(environment, gravity, render_mode)) as env:
         returns = [_episode_return(env, start, act, on_step) for start in seeds]

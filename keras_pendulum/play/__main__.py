@@ -26,9 +26,6 @@ from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from keras_pendulum.play.episode import Policy
 
 
@@ -80,25 +77,17 @@ def _load_agent(
     require_tensorflow()
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluation_gravity
+        from keras_pendulum.evaluate.loaded_policy import load_policy
         from keras_pendulum.storage.find_weights import find_weights
-        from keras_pendulum.storage.weights import load_weights
-
-    from keras_pendulum.dqn.policy import greedy_policy
-    from keras_pendulum.environments.actions import TorqueGrid
 
     path = find_weights(weights)
-    network = load_weights(path, activation)
-    provenance = network.provenance
+    policy = load_policy(path, activation)
+    provenance = policy.provenance
     if not TASKS[provenance.environment].has_torque:
         raise UserError(f"{path}: belongs to {provenance.environment}; expected Pendulum-v1")
     gravity = evaluation_gravity(provenance, gravity)
     assert gravity is not None  # only CartPole has none
-    policy, torques = greedy_policy(network), TorqueGrid(network.action_count)
-
-    def choose_torque(observation: NDArray[np.float32]) -> float:
-        return float(torques.to_env_action(policy.action(observation))[0])
-
-    return choose_torque, gravity
+    return lambda observation: float(policy(observation)[0]), gravity
 
 
 def _run_game(gravity: float, seed: int | None, agent: Policy | None, print_steps: bool) -> int:

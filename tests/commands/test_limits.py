@@ -25,7 +25,7 @@ GREATEST_SEED = 4_294_967_295
 # The first thing that each command does after it has checked its arguments.
 FIRST_WORK = {
     train: "keras_pendulum.train.__main__.require_tensorflow",
-    evaluate: "keras_pendulum.evaluate.evaluation.greedy_policy",
+    evaluate: "keras_pendulum.evaluate.evaluation.make_environment",
     page: "keras_pendulum.page.build._fill",
     play: "keras_pendulum.play.__main__.require_display",
     study: "keras_pendulum.study.__main__.require_tensorflow",

@@ -31,6 +31,19 @@ def test_returns_equal_those_of_a_plain_loop_on_gymnasium() -> None:
         assert score.returns[i] == pytest.approx(total, rel=1e-6)
 
 
+def test_network_policy_path_and_shipped_name_are_evaluated_alike() -> None:
+    path = kp.find_weights("swingup")
+    agents = ("swingup", str(path), path, kp.load_weights("swingup"), kp.load_policy("swingup"))
+    scores = [kp.evaluate_policy(agent, 1) for agent in agents]
+    assert {(score.gravity, score.mean_return) for score in scores} == {
+        (10.0, scores[0].mean_return)
+    }
+    with pytest.raises(kp.WeightsError, match="nonsense: no such file"):
+        kp.evaluate_policy("nonsense")
+    with pytest.raises(kp.UserError, match="CartPole-v1 has none"):
+        kp.evaluate_policy("cartpole", 1, gravity=1)
+
+
 def test_two_evaluations_give_the_same_numbers() -> None:
     network = kp.DQN((8,))
     first, second = (kp.evaluate_policy(network, episodes=5) for _ in range(2))
