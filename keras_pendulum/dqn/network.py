@@ -78,7 +78,7 @@ class DQN(keras.Model):
             if not layer.built:
                 layer.build(input_shape)
             input_shape = (None, layer.units)
-        self.built = True
+        self.built = self._called = True  # Keras exports no model before its first call
 
     def call(self, observation: Any) -> Any:
         """Returns the Q-values [B, A] of observations [B, D]."""
@@ -101,5 +101,5 @@ class DQN(keras.Model):
     @classmethod
     def from_config(cls, config: dict[str, Any]) -> DQN:
         """Returns a network with new weights."""
-        provenance = {field.name: config.pop(field.name) for field in fields(Provenance)}
-        return cls(**config, provenance=Provenance(**provenance))
+        run = Provenance(*(config[field.name] for field in fields(Provenance)))
+        return cls(**{key: config[key] for key in config.keys() - vars(run)}, provenance=run)

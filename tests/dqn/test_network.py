@@ -11,7 +11,9 @@ from typing import Any
 import keras
 import numpy as np
 import pytest
+import tensorflow as tf
 
+import keras_pendulum as kp
 from keras_pendulum.dqn.network import DQN, Provenance
 from keras_pendulum.dqn.policy import greedy_policy
 
@@ -133,6 +135,13 @@ def test_copy_is_an_equal_network(copied: Callable[[Any], Any]) -> None:
     assert not np.array_equal(copy(observations), network(observations))
 
 
+def test_config_makes_any_number_of_networks_and_stays_as_it_is() -> None:
+    network = DQN((8, 6), activation="relu,tanh", provenance=Provenance(gravity=2.5, seed=3))
+    config = network.get_config()
+    first, second = DQN.from_config(config), DQN.from_config(config)
+    assert config == first.get_config() == second.get_config() == network.get_config()
+
+
 def test_clone_model_makes_the_same_layers_with_new_weights() -> None:
     network = DQN((8, 6), activation="relu,tanh", seed=1)
     clone = keras.models.clone_model(network)
@@ -155,3 +164,55 @@ def test_unknown_activations_and_another_number_of_them_are_refused(activation: 
     assert [layer.activation.__name__ for layer in network.hidden] == ["tanh", "relu", "linear"]
     with pytest.raises((ValueError, KeyError)):
         greedy_policy(DQN((8, 8, 8), activation=activation))
+
+
+OBSERVATIONS = np.random.RandomState(0).randn(5, 3).astype(np.float32)  # [B, D]
+
+
+@pytest.fixture
+def loaded(tmp_path: Path) -> DQN:
+    """Returns a network as `load_weights` returns it, before its first call."""
+    kp.save_weights(DQN((8, 6), activation="relu,tanh", seed=1), tmp_path / "a.h5")
+    return kp.load_weights(tmp_path / "a.h5")
+
+
+def q_values(network: DQN) -> Any:
+    return network.clone()(OBSERVATIONS)
+
+
+def test_loaded_network_predicts_without_being_compiled(loaded: DQN) -> None:
+    np.testing.assert_allclose(
+        loaded.predict(OBSERVATIONS, verbose=0), q_values(loaded), rtol=1e-6, atol=1e-7
+    )
+
+
+def test_loaded_network_is_exported_with_its_q_values(loaded: DQN, tmp_path: Path) -> None:
+    loaded.export(tmp_path / "exported", verbose=False)
+    exported = tf.saved_model.load(tmp_path / "exported")
+    for batch in (OBSERVATIONS, OBSERVATIONS[:2]):
+        np.testing.assert_allclose(exported.serve(batch), loaded(batch), rtol=1e-6, atol=1e-7)
+
+
+def test_summary_of_a_loaded_network_has_the_size_of_each_layer(loaded: DQN) -> None:
+    lines: list[str] = []
+    loaded.summary(print_fn=lines.append, line_length=80)
+    text = "\n".join(lines)
+    for words in ("(None, 8)", "(None, 6)", "(None, 41)", "Total params: 373"):
+        assert words in text
+
+
+def test_weights_h5_of_keras_holds_an_equal_network(loaded: DQN, tmp_path: Path) -> None:
+    path = tmp_path / "a.weights.h5"
+    loaded.save_weights(path)
+    copies = [keras.models.clone_model(loaded), DQN((8, 6), activation="relu,tanh", seed=7)]
+    for other in copies:
+        assert not np.array_equal(other.get_weights()[0], loaded.get_weights()[0])
+        other.load_weights(path)
+    for other in copies:
+        np.testing.assert_array_equal(other(OBSERVATIONS), loaded(OBSERVATIONS))
+
+
+def test_loaded_network_can_be_a_layer_of_another_model(loaded: DQN) -> None:
+    model = keras.Sequential([keras.Input((3,)), loaded, keras.layers.Softmax()])
+    policy = model(OBSERVATIONS)
+    np.testing.assert_allclose(policy, keras.ops.softmax(q_values(loaded)), rtol=1e-5, atol=1e-7)

@@ -17,7 +17,10 @@ ROOMS = (
     *("study", "compare", "train", "play", "page", "evaluate", "optimum"),
     *("storage", "dqn", "config", "environments"),
 )
-WITHOUT_ROOM = ("cli", "completion", "display", "tensorflow_setup", "history", "version", "errors")
+WITHOUT_ROOM = (
+    *("cli", "completion", "display", "import_hooks", "tensorflow_setup"),
+    *("history", "version", "errors"),
+)
 ORDER = ("__main__", *ROOMS, *WITHOUT_ROOM)
 
 
