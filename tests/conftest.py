@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -74,7 +73,7 @@ def command(tmp_path: Path) -> Command:
     def run(
         name: str, *arguments: str | os.PathLike[str], environment: dict[str, str] | None = None
     ) -> subprocess.CompletedProcess[str]:
-        done = subprocess.run(
+        return subprocess.run(
             command_line(name, *arguments),
             cwd=tmp_path,
             env={**os.environ, **(environment or {})},
@@ -83,8 +82,6 @@ def command(tmp_path: Path) -> Command:
             timeout=300,
             check=False,
         )
-        done.stderr = without_gpu_note(done.stderr)
-        return done
 
     return run
 
@@ -134,15 +131,6 @@ def refusal(
         return printed.err
 
     return error_line
-
-
-def without_gpu_note(output: str) -> str:
-    """Removes the note of the package `tensorflow` that there is no GPU.
-
-    Keras 2 installs that package in the tests' environment. tensorflow-cpu prints no note
-    (tests/project/test_packaging.py).
-    """
-    return re.sub(r"^(WARNING: All log messages|I\d{4} ).*\n", "", output, flags=re.M)
 
 
 def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]:

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import Command, command_line, without_gpu_note
+from conftest import Command, command_line
 from test_commands import LATIN_1
 
 if sys.platform == "win32":
@@ -106,7 +106,7 @@ def redirected(to: str, *words: str, folder: Path) -> tuple[int, str]:
         timeout=120,
         check=False,
     )
-    return done.returncode, without_gpu_note(done.stderr)
+    return done.returncode, done.stderr
 
 
 def test_closed_output_does_not_stop_training(tmp_path: Path) -> None:

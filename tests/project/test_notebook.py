@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from typing import Any
 
@@ -18,7 +19,12 @@ def tour(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Returns the notebook with its outputs, executed in an empty folder."""
     notebook = nbformat.read(TOUR, as_version=4)  # type: ignore[no-untyped-call]
     folder = str(tmp_path_factory.mktemp("tour"))
-    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": folder}}).execute()
+    # With this variable, the kernel would not show what C++ code prints.
+    environment = {
+        name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"
+    }
+    client = NotebookClient(notebook, timeout=300, resources={"metadata": {"path": folder}})
+    client.execute(env=environment)
     return notebook
 
 
@@ -34,6 +40,11 @@ def test_original_does_not_learn_and_the_other_presets_do(tour: Any) -> None:
     assert cartpole == 0
     returns = [float(number) for number in re.findall(r"CartPole-v1: mean return (\S+)", text)]
     assert returns[-1] == 500.0
+
+
+def test_no_cell_prints_an_error_or_a_note_of_tensorflow(tour: Any) -> None:
+    outputs = [output for cell in tour.cells for output in cell.get("outputs", [])]
+    assert [output.text for output in outputs if output.get("name") == "stderr"] == []
 
 
 def test_truncated_indices_are_listed(tour: Any) -> None:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import psutil
 import pytest
-from conftest import without_gpu_note
 from test_study import STUDY, running, wait_for, workers_of
 
 if sys.platform == "win32":
@@ -27,7 +26,7 @@ def test_control_c_stops_at_once_and_says_how_to_continue(seconds: float, tmp_pa
         time.sleep(seconds)
         workers = workers_of(process)
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the workers get it too
-        output = without_gpu_note(process.communicate(timeout=60)[0])
+        output = process.communicate(timeout=60)[0]
         _, alive = psutil.wait_procs(workers, 60)
     assert [worker for worker in alive if worker.status() != psutil.STATUS_ZOMBIE] == []
     assert process.returncode == 130
