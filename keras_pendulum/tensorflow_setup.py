@@ -6,6 +6,7 @@ import contextlib
 import gc
 import os
 import sys
+import warnings
 from collections.abc import Iterator
 
 from keras_pendulum.errors import UserError
@@ -19,15 +20,35 @@ _ENVIRONMENT = {
     "TF_ENABLE_ONEDNN_OPTS": "0",
     "TF_CPP_MIN_LOG_LEVEL": "3",  # no start-up notes
 }
+_ROUNDING = ("TF_NUM_INTRAOP_THREADS", "TF_ENABLE_ONEDNN_OPTS")
+# Whether the user has imported TensorFlow before this package, and without a choice of both.
+_IMPORTED_BEFORE = "tensorflow" in sys.modules
+_MAY_ROUND_OTHERWISE = _IMPORTED_BEFORE and not os.environ.keys() >= set(_ROUNDING)
 
 
 def set_environment_defaults() -> None:
-    """Sets the variables that TensorFlow reads at its import; the user's own values stay.
+    """Sets the variables that TensorFlow reads; the user's own values stay.
 
-    They have no effect on a TensorFlow that is already imported.
+    A TensorFlow that was imported before this package stays as it is.
     """
     for name, value in _ENVIRONMENT.items():
-        os.environ.setdefault(name, value)
+        if not (_IMPORTED_BEFORE and name.startswith("TF_")):
+            os.environ.setdefault(name, value)
+
+
+def warn_if_not_reproducible() -> None:
+    """Warns before a training whose last digits may depend on the computer.
+
+    They do where TensorFlow was imported before this package and chose its threads and oneDNN.
+    """
+    if _MAY_ROUND_OTHERWISE:
+        settings = " and ".join(f"{name}={_ENVIRONMENT[name]}" for name in _ROUNDING)
+        warnings.warn(
+            "TensorFlow was imported before keras_pendulum: on another computer this run may give "
+            f"other numbers; import keras_pendulum first, or set {settings} first "
+            "(docs/reproducibility.md)",
+            stacklevel=1,  # this line, so that a process warns once
+        )
 
 
 def use_one_thread() -> None:

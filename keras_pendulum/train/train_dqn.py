@@ -15,6 +15,7 @@ from keras_pendulum.evaluate.evaluation import optimal_training_return, random_r
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.phase_plane import run_phase_planes
 from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.tensorflow_setup import warn_if_not_reproducible
 from keras_pendulum.train import run_figure
 from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 from keras_pendulum.train.loop import train_episodes
@@ -70,6 +71,7 @@ def train_dqn(
         require_type("init", init, DQN)
     if resume and (init is not None or overwrite):
         raise UserError("resume continues a run; init and overwrite start a new one")
+    warn_if_not_reproducible()
     listeners = list(listeners)
     folder = None if out is None else RunFolder(out, config.environment)
     with contextlib.ExitStack() as stack:

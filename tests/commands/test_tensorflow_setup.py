@@ -6,22 +6,80 @@ import gc
 import os
 import subprocess
 import sys
+import warnings
 
-from keras_pendulum.tensorflow_setup import fast_import
+import pytest
+from conftest import ROOT
+
+import keras_pendulum as kp
+from keras_pendulum.tensorflow_setup import _ENVIRONMENT, fast_import
 
 CODE = "import os, keras_pendulum; print(os.environ['TF_NUM_INTRAOP_THREADS'])"
+AFTER_TENSORFLOW = """
+import os, sys, types
+sys.modules["tensorflow"] = types.ModuleType("tensorflow")
+import keras_pendulum
+from keras_pendulum.tensorflow_setup import warn_if_not_reproducible
+print(sorted(name for name in os.environ if name.startswith("TF_")))
+for _ in range(2):
+    warn_if_not_reproducible()
+"""
+OWN = {"TF_NUM_INTRAOP_THREADS": "4", "TF_ENABLE_ONEDNN_OPTS": "1"}
+
+
+def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs code in a process without variables of TensorFlow."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env=clean | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
 
 
 def threads(**environment: str) -> str:
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
-    return subprocess.check_output(
-        [sys.executable, "-c", CODE], env=clean | environment, text=True
-    ).strip()
+    return run(CODE, **environment).stdout.strip()
 
 
 def test_tensorflow_uses_one_thread_unless_the_user_sets_another_number() -> None:
     assert threads() == "1"
     assert threads(TF_NUM_INTRAOP_THREADS="2") == "2"
+
+
+def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:
+    done = run(AFTER_TENSORFLOW)
+    assert done.stdout == "[]\n"
+    assert done.stderr.count("TensorFlow was imported before keras_pendulum") == 1
+    assert "TF_NUM_INTRAOP_THREADS=1 and TF_ENABLE_ONEDNN_OPTS=0" in done.stderr
+
+
+def test_users_own_settings_need_no_warning() -> None:
+    done = run(AFTER_TENSORFLOW, **OWN)
+    assert (done.stdout, done.stderr) == (f"{sorted(OWN)}\n", "")
+
+
+def test_package_imported_first_needs_no_warning() -> None:
+    code = AFTER_TENSORFLOW.replace("import os, sys", "import keras_pendulum, os, sys")
+    assert run(code).stderr == ""
+
+
+def test_warning_comes_with_a_training_and_not_with_an_evaluation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("keras_pendulum.tensorflow_setup._MAY_ROUND_OTHERWISE", True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kp.evaluate_policy(kp.DQN((8,)), 1)
+    with pytest.warns(UserWarning, match="TensorFlow was imported before"):
+        kp.train_dqn(kp.preset("original", episodes=1, hidden_units=(8,)))
+
+
+def test_document_names_each_variable_with_its_value() -> None:
+    text = (ROOT / "docs" / "reproducibility.md").read_text(encoding="utf-8")
+    for name, value in _ENVIRONMENT.items():
+        assert f"| `{name}` | {value} | " in text
 
 
 def test_fast_import_restores_the_garbage_collector() -> None:
