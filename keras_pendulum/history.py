@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 
 class EpisodeRecord(NamedTuple):
-    """The results of one training episode."""
+    """The results of one training episode; the columns of history.csv have the same names."""
 
     episode: int  # from 0
     average_reward: float  # per step
-    episode_return: float  # undiscounted sum of the rewards; "return" in history.csv
+    episode_return: float  # undiscounted sum of the rewards
     epsilon: float  # at the last step
     loss: float  # mean over the updates of the episode; NaN without updates
     environment_steps: int  # since the start of the run
@@ -30,4 +30,4 @@ class EpisodeRecord(NamedTuple):
         return ",".join("" if math.isnan(value) else repr(value) for value in self)
 
 
-CSV_HEADER = ",".join(EpisodeRecord._fields).replace("episode_return", "return")
+CSV_HEADER = ",".join(EpisodeRecord._fields)

@@ -103,7 +103,7 @@ def test_pandas_reads_the_history(in_process: Command, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     table = pandas.read_csv(tmp_path / "run" / "history.csv")
     assert list(table.episode) == list(range(42))
-    assert table["return"].between(-2000, 0).all()
+    assert table.episode_return.between(-2000, 0).all()
     assert table.loss.isna().sum() == 41
     assert {kind.kind for kind in table.dtypes} == {"i", "f"}
 
@@ -117,7 +117,7 @@ def test_tensorboard_shows_curves_and_phase_planes(in_process: Command, tmp_path
     events.Reload()
     with open(tmp_path / "run" / "history.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    for name, column in (("return", "return"), ("epsilon", "epsilon"), ("loss", "loss")):
+    for name, column in (("return", "episode_return"), ("epsilon", "epsilon"), ("loss", "loss")):
         logged = {
             event.step: float(tf.make_ndarray(event.tensor_proto)) for event in events.Tensors(name)
         }

@@ -43,10 +43,11 @@ def test_run_leaves_its_four_files(tmp_path: Path) -> None:
     with open(folder / "history.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert ",".join(rows[0]) == (
-        "episode,average_reward,return,epsilon,loss,environment_steps,updates,seconds"
+        "episode,average_reward,episode_return,epsilon,loss,environment_steps,updates,seconds"
     )
     assert len(rows) == 46
-    assert [float(row["return"]) for row in rows] == [r.episode_return for r in result.history]
+    returns = [record.episode_return for record in result.history]
+    assert [float(row["episode_return"]) for row in rows] == returns
     assert rows[40]["loss"] == ""
     assert float(rows[41]["loss"]) > 0
     assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "150")
@@ -218,6 +219,18 @@ def test_resumed_run_removes_temporary_files_of_a_killed_run(tmp_path: Path) -> 
     (tmp_path / "mine.tmp").touch()
     kp.train_dqn(config, tmp_path, resume=True)
     assert [file.name for file in tmp_path.glob("*.tmp")] == ["mine.tmp"]
+
+
+def test_resumed_run_renames_the_column_of_an_older_version(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    history = tmp_path / "history.csv"
+    text = history.read_text(encoding="utf-8")
+    older = text.replace(",episode_return,", ",return,")
+    assert older != text
+    history.write_text(older, encoding="utf-8")
+    kp.train_dqn(config, tmp_path, resume=True)
+    assert history.read_text(encoding="utf-8") == text
 
 
 def test_folder_with_two_checkpoints_needs_the_environment(tmp_path: Path) -> None:
