@@ -17,6 +17,7 @@ class EpisodeRecord(NamedTuple):
     environment_steps: int  # since the start of the run
     updates: int  # since the start of the run
     seconds: float  # wall-clock time of the episode and its updates
+    greedy_regret: float = math.nan  # of the evaluation after the episode; NaN without one
 
     def line(self) -> str:
         """Returns the line that the original prints."""
@@ -25,9 +26,16 @@ class EpisodeRecord(NamedTuple):
             f"Epsilon: {self.epsilon:.2f}"
         )
 
-    def csv_row(self) -> str:
-        """Returns the row of history.csv; a NaN is an empty cell, as pandas expects."""
-        return ",".join("" if math.isnan(value) else repr(value) for value in self)
+    def csv_row(self, evaluated: bool = False) -> str:
+        """Returns the row of history.csv; a NaN is an empty cell, as pandas expects.
+
+        The column `greedy_regret` is only in the files of runs that are evaluated.
+        """
+        values = self if evaluated else self[:-1]
+        return ",".join("" if math.isnan(value) else repr(value) for value in values)
 
 
-CSV_HEADER = ",".join(EpisodeRecord._fields)
+def csv_header(evaluated: bool = False) -> str:
+    """Returns the header of history.csv."""
+    names = EpisodeRecord._fields if evaluated else EpisodeRecord._fields[:-1]
+    return ",".join(names)

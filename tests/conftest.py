@@ -141,7 +141,7 @@ def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]
 def comparable(result: kp.TrainingResult) -> list[tuple[float, ...]]:
     """Returns the history without its wall-clock times."""
     return [
-        tuple(-1.0 if np.isnan(value) else value for value in record[:-1])
+        tuple(-1.0 if np.isnan(value) else value for value in record._replace(seconds=0.0))
         for record in result.history
     ]
 

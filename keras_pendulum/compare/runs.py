@@ -38,7 +38,7 @@ class ComparedRun:
             if getattr(self.config, spec.name) != getattr(preset, spec.name)
         }
         # These have a column of their own, or change nothing.
-        for name in ("preset", "seed", "episodes", "save_every"):
+        for name in ("preset", "seed", "episodes", "save_every", "evaluate_every", "keep_best"):
             changes.pop(name, None)
         return " ".join(f"{name}={format_value(value)}" for name, value in changes.items())
 

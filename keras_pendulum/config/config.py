@@ -154,12 +154,26 @@ class Config:
         Text(("exact", "truncated")),
     )
     save_every: int = setting(10, "episodes between two checkpoints", Integer(1, 1_000_000))
+    evaluate_every: int = setting(
+        0,
+        "episodes between two greedy evaluations during the run, 0 for none; each plays the 50 "
+        "starts of seeds 900 to 949, on which no result is reported, takes about 0.3 s (with 50, a "
+        "fifth of the training time of reference), and does not change the training",
+        Integer(0, 1_000_000),
+    )
+    keep_best: bool = setting(
+        False,
+        "true: save the weights of the best evaluation (evaluate_every) as ..._best.h5, beside the "
+        "last weights",
+        Switch(),
+    )
 
     def __post_init__(self) -> None:
         for spec in fields(self):
             value = validate_setting(spec.name, getattr(self, spec.name))
             object.__setattr__(self, spec.name, value)
         self._check_task()
+        self._check_evaluations()
         self._check_size()
         if self.train_frequency == "step" and self.learning_rate_schedule == "cosine":
             raise ConfigError(
@@ -197,6 +211,19 @@ class Config:
                 f"torque_count {self.torque_count}"
             )
 
+    def _check_evaluations(self) -> None:
+        """Raises ConfigError where the run would have no evaluation, or no best one."""
+        if self.evaluate_every > self.episodes:
+            raise ConfigError(
+                f"evaluate_every {self.evaluate_every} is larger than the run's {self.episodes} "
+                "episodes: make it smaller, or 0 for no evaluation"
+            )
+        if self.keep_best and not self.evaluate_every:
+            raise ConfigError(
+                "keep_best needs evaluate_every: set the episodes between two evaluations, such as "
+                "--evaluate-every 50"
+            )
+
     def _check_size(self) -> None:
         """Raises ConfigError for a run whose checkpoint would be too large to load."""
         task = TASKS[self.environment]
@@ -206,6 +233,7 @@ class Config:
         copies = 4 if self.optimizer == "adam" else 5  # online, target, and the optimizer's moments
         transition = 8 * task.observation_size + 9  # bytes
         size = 4 * copies * weights + self.replay_capacity * transition + 64 * self.episodes
+        size += 16 * (self.episodes // self.evaluate_every) if self.evaluate_every else 0
         if size > LARGEST_FILE - 2**20:
             raise ConfigError(
                 f"hidden_units and replay_capacity make a checkpoint of {size / 2**30:.1f} GiB; "

@@ -18,22 +18,31 @@ _FIRST = (
     *("gravity", "episodes", "seed", "hidden_units", "replay_capacity", "batch_size", "discount"),
     *("epsilon_decay", "updates_per_episode", "learning_rate"),
 )
+# These change nothing in what is learned, and `--help` shows them too.
+_EVALUATIONS = ("evaluate_every", "keep_best")
 
 
 def add_config_flags(parser: OneLineParser) -> None:
-    """Adds one flag for each setting but `preset`; a flag that is not typed stays unset."""
+    """Adds one flag for each setting but `preset`; a flag that is not typed stays unset.
+
+    `--keep-best` and other switches need no value: alone they are true.
+    """
     first = parser.add_argument_group(
         "settings that people change first (each preset has its own defaults)"
     )
+    evaluations = parser.add_argument_group("evaluations during the run")
     others = parser.add_argument_group("other settings")
+    groups = dict.fromkeys(_FIRST, first) | dict.fromkeys(_EVALUATIONS, evaluations)
     for spec in fields(Config):
         if spec.name != "preset":
             kind = kind_of(spec)
             choices = kind.choices if isinstance(kind, Text) else None
-            flag = (first if spec.name in _FIRST else others).add_argument(
+            flag = groups.get(spec.name, others).add_argument(
                 _flag(spec.name),
                 dest=spec.name,
                 action=_Setting,
+                nargs="?" if isinstance(kind, Switch) else None,
+                const="true",  # of a switch without a value
                 choices=choices or None,
                 default=argparse.SUPPRESS,
                 metavar=None if choices else "{true,false}" if isinstance(kind, Switch) else "N",
@@ -41,7 +50,7 @@ def add_config_flags(parser: OneLineParser) -> None:
             )
             if isinstance(kind, Switch):
                 complete_with(flag, names(("true", "false")))
-            if spec.name not in _FIRST:
+            if spec.name not in groups:
                 parser.hide(flag)
     for name in RENAMED:
         parser.add_argument(_flag(name), dest=name, action=_Setting, help=argparse.SUPPRESS)

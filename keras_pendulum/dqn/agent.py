@@ -55,6 +55,8 @@ class Agent:
         self.policy = greedy_policy(online)
         optimizer.build(online.trainable_variables)
         self._compiled: dict[tuple[int, ...], Callable[..., Any]] = {}  # by the batches' shape
+        # Called before a compilation, which takes about a second.
+        self.on_compile: Callable[[], object] = lambda: None
 
     def select_action(self, observation: NDArray[np.float32], epsilon: float) -> int:
         """Returns a random action with probability ε, else the greedy one of observation [D]."""
@@ -70,6 +72,7 @@ class Agent:
         tensors = [tf.constant(field) for field in batches]
         shape = batches.action.shape
         if shape not in self._compiled:
+            self.on_compile()
             # A concrete function, because a plain tf.function checks its arguments at each call.
             steps = tf.function(self._gradient_steps, jit_compile=True, autograph=False)
             self._compiled[shape] = steps.get_concrete_function(*tensors)

@@ -117,6 +117,11 @@ def _parse_arm(text: str) -> Arm:
                 f"the arm {name.strip()!r} cannot set {field}: the study's seeds are 0, 1, …, and "
                 "the preset comes before the settings"
             )
+        if field in ("evaluate_every", "keep_best"):
+            raise ConfigError(
+                f"the arm {name.strip()!r} cannot set {field}: a study evaluates each run at its "
+                "end, and saves no weights"
+            )
         settings[field] = parse_setting(field, value)
     return Arm(name.strip(), preset(words[0], **settings))
 

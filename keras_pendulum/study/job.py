@@ -165,8 +165,7 @@ def _is_possible(result: RunResult, config: Config) -> bool:
 
 def _settings(job: Job) -> dict[str, Any]:
     """Returns everything that identifies the job, as JSON reads it back."""
-    config = dict(vars(job.config))  # `asdict` copies deeply, which takes ten times as long
-    config["hidden_units"] = list(config["hidden_units"])
+    config = config_as_json(job.config)
     return {
         "arm": job.arm,
         "seed": config.pop("seed"),
@@ -174,6 +173,15 @@ def _settings(job: Job) -> dict[str, Any]:
         "versions": job.versions,
         "episodes_per_point": EPISODES_PER_POINT,
     }
+
+
+def config_as_json(config: Config) -> dict[str, Any]:
+    """Returns the settings that a run of a study can have, as JSON reads them back."""
+    settings = dict(vars(config))  # `asdict` copies deeply, which takes ten times as long
+    settings["hidden_units"] = list(config.hidden_units)
+    for name in ("evaluate_every", "keep_best"):  # no arm sets them, see `own_arms`
+        del settings[name]
+    return settings
 
 
 def _with_checksum(content: dict[str, Any]) -> bytes:

@@ -9,7 +9,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from keras_pendulum.study.job import (
     Job,
     Reply,
     RunResult,
+    config_as_json,
     decode,
     installed_versions,
     require_versions,
@@ -173,7 +174,7 @@ class ResultsFolder:
 
     def _description(self) -> dict[str, Any]:
         arms = [
-            {"name": arm.name, "baseline": arm.baseline, "config": asdict(arm.config)}
+            {"name": arm.name, "baseline": arm.baseline, "config": config_as_json(arm.config)}
             for arm in self._arms
         ]
         return {"versions": self.versions, "arms": arms}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import warnings
 from collections.abc import Callable, Iterator
@@ -25,7 +26,7 @@ from keras_pendulum.storage.weights import changed_versions, encode_weights, req
 from keras_pendulum.train.run import Run, make_run
 
 # A resumed run may change these settings; any other change makes another run.
-_MAY_CHANGE = {"episodes", "save_every"}
+_MAY_CHANGE = {"episodes", "save_every", "evaluate_every", "keep_best"}
 
 
 def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
@@ -64,10 +65,13 @@ class CheckpointWriter:
         call, or at the end of the `with` block.
         """
         # The thread does not encode: it would take Python's lock from the run, for twice as long.
-        content = _encode(run)
+        self.write(self.path, _encode(run))
+
+    def write(self, path: str | os.PathLike[str], content: bytes) -> None:
+        """Starts to write a file of the run, after the previous one. Raises as `save` does."""
         self._wait()
         self._last = self._thread.submit(
-            write_with_checksum, self.path, content, check=lambda file: self._require_not_moved()
+            write_with_checksum, path, content, check=lambda file: self._require_not_moved()
         )
 
     def _wait(self) -> None:
@@ -94,17 +98,25 @@ def _encode(run: Run) -> bytes:
         "environment": run.env.unwrapped.np_random.bit_generator.state,
         "replay_added": run.replay.added,
     }
+    arrays: dict[str, NDArray[Any]] = {
+        # JSON as an array, because an attribute can hold no more than 64 KB.
+        "state": np.frombuffer(json.dumps(json_state).encode(), np.uint8),
+        "history": np.array([record[:-1] for record in run.history], np.float64),
+    }
+    evaluations = [
+        (record.episode, record.greedy_regret)
+        for record in run.history
+        if not math.isnan(record.greedy_regret)
+    ]
+    if evaluations:
+        arrays["evaluations"] = np.array(evaluations, np.float64)
     return encode_weights(
         online,
         online.get_weights(),
         target=_dataset_names(agent["target"]),
         optimizer=_dataset_names(agent["optimizer"]),
         replay=run.replay.get_state(),
-        run={
-            # JSON as an array, because an attribute can hold no more than 64 KB.
-            "state": np.frombuffer(json.dumps(json_state).encode(), np.uint8),
-            "history": np.array(run.history, np.float64),
-        },
+        run=arrays,
     )
 
 
@@ -126,7 +138,7 @@ def load_history(path: str | os.PathLike[str]) -> tuple[Config, list[EpisodeReco
     """
     with open_h5(path) as file:
         config = _config(_read_json_state(file, path), path)
-        return config, [_record(row) for row in file.read("run/history", finite=False)]
+        return config, _read_history(file)
 
 
 def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool = False) -> Run:
@@ -134,7 +146,8 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
 
     Args:
         path: the checkpoint.
-        config: the settings of the run; only `episodes` and `save_every` may differ.
+        config: the settings of the run; only `episodes`, `save_every`, `evaluate_every` and
+            `keep_best` may differ.
         render: whether to show the environment in a window.
 
     Raises:
@@ -151,11 +164,11 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
                     f"{path}: this run has {spec.name} {old}, not {new}: resume it without this "
                     "change, or start another run in another folder"
                 )
-        rows = file.read("run/history", finite=False)
-        if len(rows) > config.episodes:
+        history = _read_history(file)
+        if len(history) > config.episodes:
             raise ConfigError(
-                f"{path}: this run has {len(rows)} episodes already; episodes is "
-                f"{config.episodes}, expected at least {len(rows)}"
+                f"{path}: this run has {len(history)} episodes already; episodes is "
+                f"{config.episodes}, expected at least {len(history)}"
             )
         size = TASKS[stored.environment].observation_size
         layers = read_layers(file, os.fsdecode(path), size, None)
@@ -180,7 +193,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
         run.replay.set_state(replay, state["replay_added"])
         run.streams.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]
-        run.history = [_record(row) for row in rows]
+        run.history = history
     return run
 
 
@@ -213,9 +226,14 @@ def _arrays(file: H5File, group: str) -> Iterator[tuple[str, NDArray[Any]]]:
             yield name.removeprefix(f"{group}/"), file.read(name)
 
 
-def _record(row: NDArray[np.float64]) -> EpisodeRecord:
+def _read_history(file: H5File) -> list[EpisodeRecord]:
+    rows = file.read("run/history", finite=False)
+    evaluations = file.read("run/evaluations") if "run/evaluations" in file else np.empty((0, 2))
+    regrets = dict(zip(*evaluations.T.tolist(), strict=True))  # by episode
     integers = {"episode", "environment_steps", "updates"}
-    values = zip(EpisodeRecord._fields, row.tolist(), strict=True)
-    return EpisodeRecord(
-        **{name: int(value) if name in integers else value for name, value in values}
-    )
+    history = []
+    for row in rows.tolist():
+        values = dict(zip(EpisodeRecord._fields[:-1], row, strict=True))
+        values |= {name: int(values[name]) for name in integers}
+        history.append(EpisodeRecord(**values, greedy_regret=regrets.get(row[0], math.nan)))
+    return history

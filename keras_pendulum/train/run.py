@@ -68,14 +68,11 @@ def make_run(config: Config, initial: DQN | None = None, render: bool = False) -
     if initial is not None:
         _copy_weights(initial, online)
     target, update_target = make_target(online, config)
+    mode = "human" if render else None
+    env = make_environment(config.environment, config.gravity, mode, config.max_episode_steps)
     return Run(
         config,
-        make_environment(
-            config.environment,
-            config.gravity,
-            "human" if render else None,
-            config.max_episode_steps,
-        ),
+        env,
         actions,
         Agent(
             online,

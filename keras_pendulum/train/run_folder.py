@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 from keras_pendulum.config.config import Config
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
-from keras_pendulum.history import CSV_HEADER, EpisodeRecord
+from keras_pendulum.history import EpisodeRecord, csv_header
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.folder_lock import lock_folder
 
@@ -46,13 +47,16 @@ class RunFolder:
             raise UserError(f"{path} holds {names}: move one of them to another folder")
         else:
             self.weights = (existing or checkpoints)[0]
-        self._other_checkpoints = [file for file in checkpoints if file != self.weights]
+        self.best = _best_file(self.weights)
+        others = [file for file in checkpoints if file != self.weights]
+        self._others = [*others, *map(_best_file, others)]  # of a run in another environment
         self.history = self._real_path / "history.csv"
         self.config = self._real_path / "config.json"
         self.picture = self._real_path / "rewards.png"
         self.events = self._real_path / "tensorboard"
+        self._evaluated = False  # whether history.csv has the column of the evaluations
         self.require_not_moved: Callable[[], None] = lambda: None  # see folder_lock.lock_folder
-        for file in (*self.files, *self._other_checkpoints):
+        for file in (*self.files, *self._others):
             # Through a link, the run would replace a file of another folder.
             if file.is_symlink() or (file.exists() and not file.is_file()):
                 raise UserError(
@@ -62,8 +66,8 @@ class RunFolder:
 
     @property
     def files(self) -> list[Path]:
-        """The files that a finished run leaves in the folder."""
-        return [self.weights, self.history, self.config, self.picture]
+        """The files that a finished run leaves in the folder; the second only with `keep_best`."""
+        return [self.weights, self.best, self.history, self.config, self.picture]
 
     def create(self) -> None:
         """Creates the folder if it does not exist. Raises UserError when that fails."""
@@ -86,7 +90,7 @@ class RunFolder:
 
     def require_unused(self, overwrite: bool) -> None:
         """Raises UserError when the folder holds a run and `overwrite` is false."""
-        files = [*self.files, *self._other_checkpoints]
+        files = [*self.files, *self._others]
         used = [file.name for file in files if file.exists()]
         used += [self.events.name] if self._event_files() else []
         if used and not overwrite:
@@ -100,20 +104,23 @@ class RunFolder:
 
         Raises UserError when one cannot be removed.
         """
-        _remove(*self._other_checkpoints)
+        _remove(self.best, *self._others)
         if events := self._event_files():
             _remove(*events)
             with contextlib.suppress(OSError):  # the folder holds other files too
                 self.events.rmdir()
 
-    def start_files(self, config: Config, history: Iterable[EpisodeRecord]) -> None:
+    def start_files(self, config: Config, history: Sequence[EpisodeRecord]) -> None:
         """Writes the settings and the history so far, and removes temporary files and the picture.
 
         Raises UserError when the folder cannot be written.
         """
-        for file in (*self.files, *self._other_checkpoints):
+        for file in (*self.files, *self._others):
             _remove(*self._real_path.glob(f".{file.name}.*.tmp"))
         _remove(self.picture)
+        self._evaluated = config.evaluate_every > 0 or not all(
+            math.isnan(record.greedy_regret) for record in history
+        )
         write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
         self._write_history(history)
 
@@ -129,7 +136,7 @@ class RunFolder:
                 lambda: open(self.history, "r+", encoding="ascii", newline="")
             ) as file:
                 file.seek(0, os.SEEK_END)
-                file.write(record.csv_row() + "\n")
+                file.write(record.csv_row(self._evaluated) + "\n")
         except FileNotFoundError:
             pass
         except OSError as error:
@@ -144,12 +151,18 @@ class RunFolder:
             self._write_history(history)
 
     def _write_history(self, history: Iterable[EpisodeRecord]) -> None:
-        lines = [CSV_HEADER, *(record.csv_row() for record in history)]
+        evaluated = self._evaluated
+        lines = [csv_header(evaluated), *(record.csv_row(evaluated) for record in history)]
         write_atomically(self.history, "".join(line + "\n" for line in lines).encode())
 
     def _event_files(self) -> list[Path]:
         # By their names: a folder called tensorboard may hold other files.
         return list(self.events.glob("events.out.tfevents.*"))
+
+
+def _best_file(weights: Path) -> Path:
+    """Returns the file of the best weights beside a checkpoint: `pendulum_weight_best.h5`."""
+    return weights.with_name(f"{weights.stem}_best{weights.suffix}")
 
 
 def _remove(*files: Path) -> None:

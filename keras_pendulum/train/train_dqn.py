@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.dqn.network import DQN
@@ -18,9 +19,12 @@ from keras_pendulum.storage.atomic_write import write_atomically
 from keras_pendulum.tensorflow_setup import warn_if_not_reproducible
 from keras_pendulum.train import run_figure
 from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
+from keras_pendulum.train.evaluations import BestWeights, evaluate_if_due
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import Run, make_run
 from keras_pendulum.train.run_folder import RunFolder
+
+Phase = Literal["compiling", "evaluating", "drawing"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,7 @@ def train_dqn(
     resume: bool = False,
     listeners: Iterable[Callable[[EpisodeRecord], None]] = (),
     on_checkpoint: Callable[[DQN, int], None] = lambda network, episode: None,
+    on_phase: Callable[[Phase], None] = lambda phase: None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> TrainingResult:
     """Trains a DQN.
@@ -52,18 +57,19 @@ def train_dqn(
         init: a network whose weights replace the seeded initial weights.
         render: whether to show the environment in a window, at its own speed.
         overwrite: replaces a run that `out` already holds.
-        resume: continues from the checkpoint in `out`; `config` may change only `episodes` and
-            `save_every`.
+        resume: continues from the checkpoint in `out`; `config` may change only `episodes`,
+            `save_every`, `evaluate_every` and `keep_best`.
         listeners: called with the record of each episode.
         on_checkpoint: called with the network and the episode at each checkpoint.
+        on_phase: called when another phase than the training begins. A record ends it.
         should_stop: called after each episode; true ends the run there, with a checkpoint.
 
     Raises:
         ConfigError: the settings do not fit `init` or the checkpoint.
         WeightsError: the checkpoint is damaged.
-        UserError: `resume` is combined with `init` or `overwrite`; `out` is in use, cannot be
-            written or is moved meanwhile; or an observation, a reward, a loss or a weight is not
-            finite. The last checkpoint then holds finite weights.
+        UserError: `resume` is combined with `init` or `overwrite`; `keep_best` has no `out`; `out`
+            is in use, cannot be written or is moved meanwhile; or an observation, a reward, a loss
+            or a weight is not finite. The last checkpoint then holds finite weights.
         TypeError: `config` is no Config, or `init` is no DQN.
     """
     require_type("config", config, Config)
@@ -71,8 +77,10 @@ def train_dqn(
         require_type("init", init, DQN)
     if resume and (init is not None or overwrite):
         raise UserError("resume continues a run; init and overwrite start a new one")
+    if config.keep_best and out is None:
+        raise UserError("keep_best needs `out`, the folder for the best weights")
+    hooks = _Hooks(list(listeners), on_checkpoint, on_phase, should_stop)
     warn_if_not_reproducible()
-    listeners = list(listeners)
     folder = None if out is None else RunFolder(out, config.environment)
     with contextlib.ExitStack() as stack:
         if resume:
@@ -92,22 +100,28 @@ def train_dqn(
                 # no policy of another run stays in the folder.
                 save_checkpoint(run, folder.weights)
                 folder.remove_old_run()
+        run.agent.on_compile = lambda: on_phase("compiling")
         if folder is None:
-            finished = _train(run, listeners, should_stop)
+            finished = _train(run, hooks)
         else:
+            best = BestWeights(folder.best) if config.keep_best else None
             folder.start_files(config, run.history)
-            finished = _train_in_folder(run, folder, listeners, on_checkpoint, should_stop)
+            finished = _train_in_folder(run, folder, best, hooks)
     return TrainingResult(run.agent.online, run.history, finished)
 
 
-def _train_in_folder(
-    run: Run,
-    folder: RunFolder,
-    listeners: Iterable[Callable[[EpisodeRecord], None]],
-    on_checkpoint: Callable[[DQN, int], None],
-    should_stop: Callable[[], bool],
-) -> bool:
-    """Trains as `_train` does, and writes history, checkpoints and the picture."""
+@dataclass(frozen=True)
+class _Hooks:
+    """The caller's functions; see `train_dqn`."""
+
+    listeners: list[Callable[[EpisodeRecord], None]]
+    on_checkpoint: Callable[[DQN, int], None]
+    on_phase: Callable[[Phase], None]
+    should_stop: Callable[[], bool]
+
+
+def _train_in_folder(run: Run, folder: RunFolder, best: BestWeights | None, hooks: _Hooks) -> bool:
+    """Trains as `_train` does, and writes history, checkpoints, best weights and the picture."""
     config = run.config
     last_saved = -1  # the episode of the last checkpoint
     with CheckpointWriter(folder.weights, folder.require_not_moved) as writer:
@@ -117,17 +131,23 @@ def _train_in_folder(
             last_saved = run.history[-1].episode
             folder.restore_history(run.history)
             writer.save(run)
-            on_checkpoint(run.agent.online, last_saved)
+            hooks.on_checkpoint(run.agent.online, last_saved)
 
         def write_files(record: EpisodeRecord) -> None:
             folder.append(record)
-            if record.episode % config.save_every == 0:
+            is_best = best is not None and best.are_beaten_by(record)
+            if is_best or record.episode % config.save_every == 0:
                 save()
+            if best is not None and is_best:
+                best.write(run, writer)
 
-        finished = _train(run, [write_files, *listeners], should_stop)
+        if best is not None and run.history and best.are_beaten_by(run.history[-1]):
+            best.write(run, writer)  # the run was killed between the two files
+        finished = _train(run, hooks, write_files)
         if run.history[-1].episode != last_saved:
             save()
     if finished:
+        hooks.on_phase("drawing")
         planes = run_phase_planes(run.agent.online, config)
         returns = _reference_returns(config)
         try:
@@ -140,16 +160,13 @@ def _train_in_folder(
     return finished
 
 
-def _train(
-    run: Run,
-    listeners: Iterable[Callable[[EpisodeRecord], None]],
-    should_stop: Callable[[], bool],
-) -> bool:
+def _train(run: Run, hooks: _Hooks, *first_listeners: Callable[[EpisodeRecord], None]) -> bool:
     """Trains to the last episode or until `should_stop`; returns whether the run is finished."""
-    for record in train_episodes(run):
-        for listener in listeners:
+    for _ in train_episodes(run):
+        record = evaluate_if_due(run, lambda: hooks.on_phase("evaluating"))
+        for listener in (*first_listeners, *hooks.listeners):
             listener(record)
-        if should_stop() and record.episode + 1 < run.config.episodes:
+        if hooks.should_stop() and record.episode + 1 < run.config.episodes:
             return False
     return True
 

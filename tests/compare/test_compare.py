@@ -29,7 +29,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Runs of two tasks, and a copy of one in a folder of the same name."""
     folder = tmp_path_factory.mktemp("runs")
     make_run(folder / "one", "original", seed=1)
-    make_run(folder / "two", "reference", seed=2, discount=0.5, save_every=2)
+    every = {"save_every": 2, "evaluate_every": 2, "keep_best": True}
+    make_run(folder / "two", "reference", seed=2, discount=0.5, **every)
     make_run(folder / "pole", "cartpole-original")
     make_run(folder / "strong", "reference", gravity=10.0)
     return folder

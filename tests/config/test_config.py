@@ -37,6 +37,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "tau": (0, 1),
     "target_period": (1, 1_000_000),
     "save_every": (1, 1_000_000),
+    "evaluate_every": (0, 1_000_000),
 }
 
 
@@ -202,6 +203,19 @@ def assert_largest_batch(config: Config, stored: int) -> None:
         dataclasses.replace(config, batch_size=stored + 1)
 
 
+def test_each_evaluation_adds_16_bytes_to_the_largest_checkpoint() -> None:
+    # As above, with 4 evaluations in place of the last of 362 episodes.
+    largest = kp.preset(
+        "reference",
+        hidden_units=(8192, 6000),
+        replay_capacity=8_535_792,
+        episodes=361,
+        evaluate_every=90,
+    )
+    with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
+        dataclasses.replace(largest, evaluate_every=72)
+
+
 @pytest.mark.parametrize("warmup", [0, 1, 41])
 def test_batch_larger_than_the_buffer_at_the_first_update_is_refused(warmup: int) -> None:
     config = kp.preset("reference", warmup_episodes=warmup, max_episode_steps=5, batch_size=5)
@@ -267,6 +281,12 @@ def test_total_updates_without_warmup_counts_every_episode() -> None:
             "learning_rate_schedule cosine needs train_frequency",
         ),
         ("reference", {"gravity": None}, "gravity is missing; Pendulum-v1 needs it"),
+        (
+            "reference",
+            {"episodes": 9, "evaluate_every": 10},
+            "evaluate_every 10 is larger than the run's 9 episodes: make it smaller, or 0",
+        ),
+        ("cartpole", {"keep_best": True}, "keep_best needs evaluate_every: .*--evaluate-every 50"),
         (
             "walkthrough",
             {"torque_count": 40},

@@ -82,6 +82,11 @@ def test_flag_and_text_give_the_same_value(name: str, text: str, value: object) 
     assert parse_setting(name, text) == value
 
 
+def test_switch_without_a_value_is_true() -> None:
+    assert typed("--keep-best", "--evaluate-every", "5") == {"keep_best": True, "evaluate_every": 5}
+    assert typed("--double-q", "--keep-best", "false") == {"double_q": True, "keep_best": False}
+
+
 @pytest.mark.parametrize("name", SETTINGS)
 def test_every_setting_of_every_preset_can_be_typed(name: str) -> None:
     for config in PRESETS.values():
@@ -129,9 +134,10 @@ def test_help_lists_the_settings_without_the_old_names(help_lines: dict[str, str
     assert set(help_lines) == {flag(name) for name in SETTINGS}
 
 
-def test_short_help_shows_ten_settings() -> None:
+def test_short_help_shows_ten_settings_and_the_evaluations() -> None:
     shown = set(flags_in(make_parser().format_help()))
-    assert len(shown) == 10
+    assert shown > {"--evaluate-every", "--keep-best"}
+    assert len(shown) == 10 + 2
     assert shown >= {"--episodes", "--seed", "--gravity", "--learning-rate", "--hidden-units"}
 
 
@@ -181,7 +187,7 @@ def test_help_shows_the_defaults_of_the_reference_and_of_the_originals(
     ("name", "values"),
     [
         ("loss", "{squared,huber}"),
-        ("double_q", "{true,false}"),
+        ("double_q", "[{true,false}]"),
         ("episodes", "N"),
         ("hidden_units", "N"),
     ],

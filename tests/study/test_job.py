@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -65,6 +66,13 @@ POLE_RESULT = RunResult(500.0, [499.0] * 100, [1.0] * 2, [20.0] * 2)
 def test_numbers_at_the_limits_are_valid(changes: dict[str, Any]) -> None:
     result = PENDULUM_RESULT._replace(**changes)
     assert decode(encode(PENDULUM, result), PENDULUM) == result
+
+
+def test_result_has_no_settings_of_evaluations_during_the_run() -> None:
+    # So the results of studies from before these settings are still valid.
+    settings = json.loads(encode(PENDULUM, PENDULUM_RESULT))["result"]["config"]
+    assert "save_every" in settings
+    assert not {"evaluate_every", "keep_best"} & set(settings)
 
 
 def test_cartpole_results_at_the_limits_are_valid() -> None:

@@ -148,8 +148,11 @@ OTHER_VALUES: dict[str, Any] = {
 }
 
 
+CHANGEABLE = ("episodes", "save_every", "evaluate_every", "keep_best")
+
+
 @pytest.mark.parametrize(
-    "name", [spec.name for spec in fields(Config) if spec.name not in ("episodes", "save_every")]
+    "name", [spec.name for spec in fields(Config) if spec.name not in CHANGEABLE]
 )
 def test_resuming_with_another_setting_raises_and_names_it(
     name: str, run_of_one_episode: tuple[Config, Path]
@@ -163,11 +166,11 @@ def test_resuming_with_another_setting_raises_and_names_it(
         load_checkpoint(folder / "pendulum_weight.h5", replace(config, **changes))
 
 
-def test_resumed_run_can_have_another_save_every(
+def test_resumed_run_can_be_saved_and_evaluated_at_other_episodes(
     run_of_one_episode: tuple[Config, Path],
 ) -> None:
     config, folder = run_of_one_episode
-    other = replace(config, save_every=3)
+    other = replace(config, save_every=3, episodes=2, evaluate_every=2, keep_best=True)
     assert load_checkpoint(folder / "pendulum_weight.h5", other).config == other
 
 
@@ -317,6 +320,30 @@ def test_checkpoint_stores_each_variable_under_its_keras_path(tmp_path: Path) ->
             np.testing.assert_array_equal(
                 file["target"][variable.path.replace("/", ".")][()], variable.numpy()
             )
+
+
+def test_checkpoint_without_the_settings_of_evaluations_is_resumed(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=3, hidden_units=(8,))
+    kp.train_dqn(replace(config, episodes=2), tmp_path)
+    with h5py.File(tmp_path / "pendulum_weight.h5", "r+") as file:
+        assert "evaluations" not in file["run"]
+        state = json.loads(file["run/state"][()].tobytes())
+        for name in ("evaluate_every", "keep_best"):
+            del state["config"][name]
+        replace_entry(file, "run/state", np.frombuffer(json.dumps(state).encode(), np.uint8))
+    assert_same(kp.train_dqn(config, tmp_path, resume=True), kp.train_dqn(config))
+
+
+def test_checkpoint_holds_the_evaluations(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=3, hidden_units=(8,))
+    run = make_run(config)
+    list(train_episodes(run))
+    run.history[1] = run.history[1]._replace(greedy_regret=0.1)
+    save_checkpoint(run, tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file["run/history"].shape == (3, 8)
+        assert file["run/evaluations"][()].tolist() == [[1.0, 0.1]]
+    np.testing.assert_array_equal(load_checkpoint(tmp_path / "a.h5", config).history, run.history)
 
 
 def test_checkpoint_records_the_settings(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ This process resumes them for the last time, because it has imported TensorFlow 
 
 from __future__ import annotations
 
+import math
 import subprocess
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -18,18 +19,28 @@ from conftest import command_line
 import keras_pendulum as kp
 from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.train.checkpoint import load_checkpoint
+from keras_pendulum.train.evaluations import evaluate_if_due
 from keras_pendulum.train.loop import train_episodes
-from keras_pendulum.train.run import Run, make_run
+from keras_pendulum.train.run import make_run
 from keras_pendulum.train.run_folder import RunFolder
 
 SIZES = {"episodes": 56, "hidden_units": (16, 8)}  # updates begin after episode 41
+# Runs that are evaluated too, and keep their best weights.
+EVALUATED = ("reference", "cartpole")
+EVALUATIONS = {"evaluate_every": 9, "keep_best": True}
 KILLED_IN = ((1, 30), (42, 54))  # first and last episode of the two kills
+
+
+def config_of(name: str) -> kp.Config:
+    return kp.preset(name, **SIZES, **(EVALUATIONS if name in EVALUATED else {}))
 
 
 def train_with_two_kills(name: str, folder: Path) -> None:
     """Runs the train command in `folder` and kills it twice."""
     random = Random(name)
     words = ["--preset", name, "--out", str(folder), "--episodes", "56", "--hidden-units", "16,8"]
+    if name in EVALUATED:
+        words += ["--evaluate-every", "9", "--keep-best"]
     for first, last in KILLED_IN:
         with subprocess.Popen(
             command_line("train", *words), stdout=subprocess.PIPE, text=True
@@ -43,28 +54,28 @@ def train_with_two_kills(name: str, folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def resumed_runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Run]:
-    """The runs in the last checkpoints, by preset."""
+def resumed_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with the folders of the runs, one for each preset."""
     folder = tmp_path_factory.mktemp("runs")
     with ThreadPoolExecutor(2) as pool:  # each thread waits for processes
         list(pool.map(lambda name: train_with_two_kills(name, folder / name), PRESETS))
     for name in PRESETS:
-        kp.train_dqn(kp.preset(name, **SIZES), folder / name, resume=True)
-    return {
-        name: load_checkpoint(RunFolder(folder / name).weights, kp.preset(name, **SIZES))
-        for name in PRESETS
-    }
+        kp.train_dqn(config_of(name), folder / name, resume=True)
+    return folder
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_killed_and_resumed_run_equals_an_uninterrupted_run(
-    name: str, resumed_runs: dict[str, Run]
-) -> None:
-    resumed, uninterrupted = resumed_runs[name], make_run(kp.preset(name, **SIZES))
-    list(train_episodes(uninterrupted))
+def test_killed_and_resumed_run_equals_an_uninterrupted_run(name: str, resumed_runs: Path) -> None:
+    config, folder = config_of(name), RunFolder(resumed_runs / name)
+    resumed, uninterrupted = load_checkpoint(folder.weights, config), make_run(config)
+    regret, best = math.inf, None
+    for _ in train_episodes(uninterrupted):
+        record = evaluate_if_due(uninterrupted, lambda: None)
+        if record.greedy_regret <= regret:
+            regret, best = record.greedy_regret, uninterrupted.agent.online.get_weights()
     np.testing.assert_array_equal(
-        [record[:-1] for record in resumed.history],
-        [record[:-1] for record in uninterrupted.history],
+        [record._replace(seconds=0.0) for record in resumed.history],
+        [record._replace(seconds=0.0) for record in uninterrupted.history],
     )
     for found, expected in zip(
         resumed.agent.online.get_weights(), uninterrupted.agent.online.get_weights(), strict=True
@@ -73,3 +84,6 @@ def test_killed_and_resumed_run_equals_an_uninterrupted_run(
     np.testing.assert_equal(resumed.agent.get_state(), uninterrupted.agent.get_state())
     np.testing.assert_equal(resumed.replay.get_state(), uninterrupted.replay.get_state())
     assert resumed.streams.get_state() == uninterrupted.streams.get_state()
+    assert folder.best.exists() == (name in EVALUATED) == (best is not None)
+    if best is not None:
+        np.testing.assert_equal(kp.load_weights(folder.best).get_weights(), best)

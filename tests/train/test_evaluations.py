@@ -1,0 +1,309 @@
+"""Evaluations during a run: they change nothing in it, and the best weights are kept."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import assert_same
+
+import keras_pendulum as kp
+from keras_pendulum.config.config import Config
+from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.optimum.optimal_return import USUAL_SEEDS
+from keras_pendulum.train import evaluations
+from keras_pendulum.train.checkpoint import load_checkpoint
+from keras_pendulum.train.evaluations import BestWeights
+from keras_pendulum.train.run import Run
+from keras_pendulum.train.run_folder import RunFolder
+
+SMALL: dict[str, Any] = {"hidden_units": (8,), "warmup_episodes": 2}
+FEW_STARTS = range(900, 903)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def short_runs() -> Iterator[None]:
+    """Evaluates on few starts and draws nothing."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(evaluations, "SEEDS", FEW_STARTS)
+        patched.setattr("keras_pendulum.train.train_dqn.run_phase_planes", lambda *run: {})
+        patched.setattr("keras_pendulum.train.run_figure.draw_run", lambda *run: b"a picture")
+        yield
+
+
+@pytest.fixture
+def regrets(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[list[Any]]]:
+    """Replaces the regrets of the next evaluations; returns the list of their weights."""
+
+    def replace_by(*values: float) -> list[list[Any]]:
+        weights: list[list[Any]] = []
+        remaining = iter(values)
+
+        def evaluate(network: kp.DQN, episodes: int, seed: int) -> kp.Score:
+            weights.append(network.get_weights())
+            return kp.Score("Pendulum-v1", 1.0, np.array([-next(remaining)]), np.zeros(1))
+
+        monkeypatch.setattr(evaluations, "evaluate_policy", evaluate)
+        return weights
+
+    return replace_by
+
+
+def evaluated(history: list[EpisodeRecord]) -> dict[int, float]:
+    """Returns the regrets of the evaluations, by episode."""
+    return {
+        record.episode: record.greedy_regret
+        for record in history
+        if not math.isnan(record.greedy_regret)
+    }
+
+
+def assert_weights(path: Path, expected: list[Any]) -> None:
+    for found, wanted in zip(kp.load_weights(path).get_weights(), expected, strict=True):
+        np.testing.assert_array_equal(found, wanted)
+
+
+def test_starts_are_not_those_of_the_results_and_their_optimum_is_never_computed_alone() -> None:
+    seeds = range(900, 950)
+    assert not set(seeds) & set(range(100))
+    assert set(seeds) <= set(USUAL_SEEDS)
+    text = Config.__dataclass_fields__["evaluate_every"].metadata["help"]
+    assert f"the {len(seeds)} starts of seeds {seeds.start} to {seeds[-1]}" in text
+
+
+@pytest.mark.parametrize("name", ["reference", "cartpole", "cartpole-original"])
+def test_evaluated_run_equals_a_run_without_evaluations_bit_for_bit(
+    name: str, tmp_path: Path
+) -> None:
+    plain = kp.preset(name, episodes=8, **SMALL)
+    config = replace(plain, evaluate_every=3, keep_best=True)
+    runs: list[Run] = []
+    for settings, folder in ((plain, tmp_path / "plain"), (config, tmp_path / "evaluated")):
+        kp.train_dqn(settings, folder)
+        runs.append(load_checkpoint(RunFolder(folder).weights, settings))
+    without, with_evaluations = runs
+    assert list(evaluated(with_evaluations.history)) == [2, 5]
+    np.testing.assert_array_equal(
+        [record._replace(seconds=0.0) for record in without.history],
+        [
+            record._replace(seconds=0.0, greedy_regret=math.nan)
+            for record in with_evaluations.history
+        ],
+    )
+    assert without.history[-1].updates > 0
+    states = [
+        (
+            run.agent.online.get_weights(),
+            run.agent.get_state(),
+            run.replay.get_state(),
+            run.streams.get_state(),
+            run.env.unwrapped.np_random.bit_generator.state,
+        )
+        for run in runs
+    ]
+    np.testing.assert_equal(states[1], states[0])
+
+
+@pytest.mark.parametrize("name", ["reference", "cartpole"])
+def test_regret_is_that_of_evaluate_policy_on_the_same_starts(name: str) -> None:
+    result = kp.train_dqn(kp.preset(name, episodes=4, evaluate_every=2, **SMALL))
+    score = kp.evaluate_policy(result.network, len(FEW_STARTS), FEW_STARTS.start)
+    assert list(evaluated(result.history)) == [1, 3]
+    assert result.history[3].greedy_regret == score.regret
+    if name == "cartpole":
+        assert score.regret == 500 - score.mean_return
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with open(folder / "history.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_history_has_the_regrets_of_evaluated_runs_only(tmp_path: Path) -> None:
+    config = kp.preset("original", episodes=3, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path)
+    assert "greedy_regret" not in rows_of(tmp_path)[0]
+    longer = replace(config, episodes=6, evaluate_every=2)
+    result = kp.train_dqn(longer, tmp_path, resume=True)
+    rows = rows_of(tmp_path)
+    assert list(rows[0])[-2:] == ["seconds", "greedy_regret"]
+    regrets = {int(row["episode"]): row["greedy_regret"] for row in rows if row["greedy_regret"]}
+    assert regrets == {i: repr(regret) for i, regret in evaluated(result.history).items()}
+    assert list(regrets) == [3, 5]
+    # The column stays when the run is no longer evaluated.
+    kp.train_dqn(replace(config, episodes=7), tmp_path, resume=True)
+    assert [row["greedy_regret"] != "" for row in rows_of(tmp_path)] == [
+        *(False, False, False, True, False, True, False)
+    ]
+
+
+def test_best_weights_are_kept_beside_the_last(
+    tmp_path: Path, regrets: Callable[..., list[list[Any]]]
+) -> None:
+    weights = regrets(9.0, 5.0, 7.0, 5.0, 6.0)
+    config = kp.preset("reference", episodes=5, evaluate_every=1, keep_best=True, **SMALL)
+    result = kp.train_dqn(config, tmp_path)
+    best = tmp_path / "pendulum_weight_best.h5"
+    assert_weights(best, weights[3])  # the later of two equals
+    assert_weights(tmp_path / "pendulum_weight.h5", result.network.get_weights())
+    assert any((one != two).any() for one, two in zip(weights[3], weights[4], strict=True))
+    assert kp.load_weights(best).provenance == result.network.provenance
+    with pytest.raises(kp.WeightsError, match="weights without a run"):
+        load_checkpoint(best, config)
+
+
+@pytest.mark.parametrize(
+    ("environment", "name"),
+    [("original", "pendulum_weight_best.h5"), ("cartpole", "cartpole_weight_best.h5")],
+)
+def test_best_weights_of_another_run_are_removed(
+    environment: str, name: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).touch()
+    config = kp.preset("original", episodes=1, hidden_units=(8,))
+    with pytest.raises(kp.UserError, match=rf"already holds a run \({name}\)"):
+        kp.train_dqn(config, tmp_path)
+    kp.train_dqn(config, tmp_path, overwrite=True)
+    assert not (tmp_path / name).exists()
+
+
+class KilledError(Exception):
+    pass
+
+
+def killed_in(function: Callable[..., Any], call: int) -> Callable[..., Any]:
+    """Returns the function; its given call ends the run."""
+    calls: Iterator[int] = iter(range(1, 100))
+
+    def wrapped(*arguments: Any) -> Any:
+        if next(calls) == call:
+            raise KilledError
+        return function(*arguments)
+
+    return wrapped
+
+
+def kill(place: str, patched: pytest.MonkeyPatch) -> None:
+    """Makes the next run end after some of its evaluations."""
+    if place == "in an evaluation":
+        due = killed_in(evaluations.evaluate_if_due, 8)
+        patched.setattr("keras_pendulum.train.train_dqn.evaluate_if_due", due)
+    elif place == "between two episodes":
+        patched.setattr(RunFolder, "append", killed_in(RunFolder.append, 10))
+    else:
+        write = killed_in(BestWeights.write, 2)
+        patched.setattr(BestWeights, "write", lambda *arguments: write(*arguments))
+
+
+@pytest.fixture(scope="module")
+def whole_run(
+    short_runs: None, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Config, kp.TrainingResult, Path]:
+    """A run that keeps its best weights and is not interrupted, and its folder."""
+    config = kp.preset(
+        "reference", episodes=12, evaluate_every=2, keep_best=True, save_every=5, **SMALL
+    )
+    folder = tmp_path_factory.mktemp("whole")
+    return config, kp.train_dqn(config, folder), folder
+
+
+AFTER_THE_CHECKPOINT = "between the checkpoint and the best weights"
+
+
+@pytest.mark.parametrize(
+    "place", ["in an evaluation", "between two episodes", AFTER_THE_CHECKPOINT]
+)
+def test_killed_and_resumed_run_keeps_the_best_weights(
+    place: str,
+    whole_run: tuple[Config, kp.TrainingResult, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    config, whole, folder = whole_run
+    with monkeypatch.context() as patched:
+        kill(place, patched)
+        with pytest.raises(KilledError):
+            kp.train_dqn(config, tmp_path)
+    resumed = kp.train_dqn(config, tmp_path, resume=True)
+    assert_same(resumed, whole)
+    assert evaluated(resumed.history) == evaluated(whole.history)
+    best = "pendulum_weight_best.h5"
+    assert (tmp_path / best).read_bytes() == (folder / best).read_bytes()
+
+
+def test_run_killed_before_its_best_weights_are_written_writes_them_when_resumed(
+    tmp_path: Path, regrets: Callable[..., list[list[Any]]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weights = regrets(9.0, 5.0, 7.0)
+    config = kp.preset("reference", episodes=3, evaluate_every=1, keep_best=True, **SMALL)
+    with monkeypatch.context() as patched:
+        kill(AFTER_THE_CHECKPOINT, patched)
+        with pytest.raises(KilledError):
+            kp.train_dqn(config, tmp_path)
+    assert_weights(tmp_path / "pendulum_weight_best.h5", weights[0])
+    kp.train_dqn(config, tmp_path, resume=True)
+    assert len(weights) == 3  # episode 1 was not evaluated again
+    assert_weights(tmp_path / "pendulum_weight_best.h5", weights[1])
+
+
+def test_run_that_asks_later_for_its_best_weights_begins_with_its_last_evaluation(
+    tmp_path: Path, regrets: Callable[..., list[list[Any]]]
+) -> None:
+    weights = regrets(1.0, 3.0, 4.0, 2.0)
+    config = kp.preset("reference", episodes=2, evaluate_every=1, **SMALL)
+    kp.train_dqn(config, tmp_path)
+    best = tmp_path / "pendulum_weight_best.h5"
+    assert not best.exists()
+    # The weights of the regret 1 are lost; the checkpoint holds those of 3.
+    kp.train_dqn(replace(config, episodes=3, keep_best=True), tmp_path, resume=True)
+    assert_weights(best, weights[1])
+    kp.train_dqn(replace(config, episodes=4, keep_best=True), tmp_path, resume=True)
+    assert_weights(best, weights[3])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"damaged", "not an HDF5 file"), (None, "weights without an evaluation; move it to another")],
+)
+def test_other_file_in_place_of_the_best_weights_stops_a_resumed_run(
+    content: bytes | None, message: str, tmp_path: Path
+) -> None:
+    config = kp.preset("original", episodes=2, evaluate_every=1, keep_best=True, **SMALL)
+    kp.train_dqn(config, tmp_path)
+    best = tmp_path / "pendulum_weight_best.h5"
+    if content is None:
+        kp.save_weights(kp.DQN((8,)), best)
+    else:
+        best.write_bytes(content)
+    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+    with pytest.raises(kp.WeightsError, match=message) as caught:
+        kp.train_dqn(config, tmp_path, resume=True)
+    assert "\n" not in str(caught.value)
+    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_best_weights_need_a_folder() -> None:
+    config = kp.preset("original", episodes=2, evaluate_every=1, keep_best=True, **SMALL)
+    with pytest.raises(kp.UserError, match="keep_best needs `out`"):
+        kp.train_dqn(config)
+
+
+def test_phases_are_announced_before_they_begin(tmp_path: Path) -> None:
+    events: list[object] = []
+    config = kp.preset("reference", episodes=5, evaluate_every=2, **SMALL)
+    kp.train_dqn(
+        config,
+        tmp_path,
+        listeners=[lambda record: events.append(record.episode)],
+        on_phase=events.append,
+    )
+    assert events == [0, "evaluating", 1, "compiling", 2, "evaluating", 3, 4, "drawing"]
+    events.clear()
+    kp.train_dqn(replace(config, episodes=6), tmp_path, resume=True, on_phase=events.append)
+    assert events == ["compiling", "evaluating", "drawing"]
