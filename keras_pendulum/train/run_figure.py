@@ -1,8 +1,9 @@
-"""Figures of a run: its learning curve, ε, loss and phase planes."""
+"""Figures of a run: its learning curve, greedy regret, ε, loss and phase planes."""
 
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,8 @@ def draw_run(
 ) -> bytes:
     """Returns a PNG with the learning curve of a run, its ε, its loss, and phase planes.
 
-    The curve shows the average reward per step; for CartPole it shows the return.
+    The curve shows the average reward per step; for CartPole it shows the return. A run that was
+    evaluated has one more curve, its greedy regret.
 
     Args:
         history: at least one record.
@@ -40,10 +42,12 @@ def draw_run(
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 12.5 if planes else 6))
-    grid = _grid(figure, 4 if planes else 2, 2)
+    evaluated = [record for record in history if not math.isnan(record.greedy_regret)]
+    row = 2 if evaluated else 1  # of ε and loss
+    figure = Figure(figsize=(9, (9.5 if planes else 3) + 3 * row))
+    grid = _grid(figure, row + (3 if planes else 1), 2)
     _draw_learning_curve(figure.add_subplot(grid[0, :]), history, environment, reference_returns)
-    epsilon, loss = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
+    epsilon, loss = figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 1])
     episodes = [record.episode for record in history]
     epsilon.plot(episodes, [record.epsilon for record in history], color="#0072B2")
     epsilon.set(xlabel="Episode", ylabel="ε, share of random actions", ylim=(0, 1))
@@ -52,8 +56,11 @@ def draw_run(
     loss.set(xlabel="Episode", ylabel="Loss", xlim=epsilon.get_xlim())
     if any(value > 0 for value in losses):
         loss.set_yscale("log")
+    if evaluated:
+        axes = figure.add_subplot(grid[1, :], xlim=epsilon.get_xlim())
+        _draw_greedy_regret(axes, evaluated)
     if planes:
-        _draw_planes(figure, grid[2:, :], planes)
+        _draw_planes(figure, grid[row + 1 :, :], planes)
     return _png(figure)
 
 
@@ -112,6 +119,21 @@ def _draw_learning_curve(
     else:  # every step has reward 1, so the curve shows the return
         values = [record.episode_return for record in history]
         _draw_curve(axes, values, "Return (steps)", mean_over=10, lines=reference_returns)
+
+
+def _draw_greedy_regret(axes: Axes, evaluated: Sequence[EpisodeRecord]) -> None:
+    """Draws the greedy regret of each evaluated episode, and marks the best of them."""
+    episodes = [record.episode for record in evaluated]
+    regrets = [record.greedy_regret for record in evaluated]
+    axes.plot(episodes, regrets, ".-", color="#0072B2", label="greedy policy, without exploration")
+    best = min(evaluated, key=lambda record: (record.greedy_regret, -record.episode))
+    name = f"best: {best.greedy_regret:.2f} after episode {best.episode}"
+    axes.plot(best.episode, best.greedy_regret, "o", color="#D55E00", label=name)
+    axes.set_yscale("symlog", linthresh=1)  # logarithmic from 1 on; a regret can be 0
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_ylim(min(0, *regrets) - 0.1, 2 * max(1, *regrets))  # no point is on the frame
+    axes.set(xlabel="Episode", ylabel="Greedy regret")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, frameon=False)
 
 
 def _draw_curve(

@@ -1,4 +1,4 @@
-"""Event files for TensorBoard: curves and phase planes of a run."""
+"""Event files for TensorBoard: curves, settings and phase planes of a run."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.config.config import Config
+from keras_pendulum.config.fields import format_value
 from keras_pendulum.errors import UserError
 
 if TYPE_CHECKING:
@@ -47,11 +48,14 @@ class TensorBoardLog:
         import tensorflow as tf
 
         values = {
-            "return": record.episode_return,
-            "average reward a step": record.average_reward,
-            "epsilon": record.epsilon,
-            "loss": record.loss,
-            "seconds": record.seconds,
+            "rollout/return": record.episode_return,
+            "rollout/average_reward": record.average_reward,
+            "rollout/epsilon": record.epsilon,
+            "rollout/environment_steps": record.environment_steps,
+            "train/loss": record.loss,
+            "train/updates": record.updates,
+            "eval/greedy_regret": record.greedy_regret,
+            "time/seconds": record.seconds,
         }
         with self._writer().as_default(step=record.episode):
             for name, value in values.items():
@@ -78,5 +82,17 @@ class TensorBoardLog:
         import tensorflow as tf
 
         if self._writer_or_none is None:
+            from tensorboard.plugins.hparams import api
+
             self._writer_or_none = tf.summary.create_file_writer(self._folder)
+            with self._writer_or_none.as_default(step=0):
+                api.hparams(_hparams(self._config))
         return self._writer_or_none
+
+
+def _hparams(config: Config) -> dict[str, bool | float | str]:
+    """Returns the settings in the types that TensorBoard's table of runs takes."""
+    return {
+        name: value if isinstance(value, bool | int | float) else format_value(value)
+        for name, value in vars(config).items()
+    }

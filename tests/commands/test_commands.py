@@ -17,6 +17,8 @@ import tensorflow as tf
 from conftest import DATA, Command, Refusal, command_line
 from PIL import Image, ImageSequence
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensorboard.plugins.hparams import plugin_data_pb2
+from tensorboard.plugins.hparams.metadata import SESSION_START_INFO_TAG
 
 import keras_pendulum as kp
 from keras_pendulum.evaluate import __main__ as evaluate
@@ -110,19 +112,32 @@ def test_pandas_reads_the_history(in_process: Command, tmp_path: Path) -> None:
 
 def test_tensorboard_shows_curves_and_phase_planes(in_process: Command, tmp_path: Path) -> None:
     words = ["--preset", "original", "--hidden-units", "8", "--out", "run", "--tensorboard"]
-    for episodes, more in ((43, ()), (52, ["--resume"])):
+    for episodes, more in ((43, ["--evaluate-every", "26"]), (52, ["--resume"])):
         done = in_process("train", *words, "--episodes", str(episodes), *more)
         assert done.returncode == 0, done.stderr
     events = EventAccumulator(str(tmp_path / "run" / "tensorboard"), {"tensors": 0})
     events.Reload()
     with open(tmp_path / "run" / "history.csv", encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    for name, column in (("return", "episode_return"), ("epsilon", "epsilon"), ("loss", "loss")):
+    for name, column in (
+        ("rollout/return", "episode_return"),
+        ("rollout/epsilon", "epsilon"),
+        ("rollout/environment_steps", "environment_steps"),
+        ("train/loss", "loss"),
+        ("train/updates", "updates"),
+        ("eval/greedy_regret", "greedy_regret"),
+    ):
         logged = {
             event.step: float(tf.make_ndarray(event.tensor_proto)) for event in events.Tensors(name)
         }
         wanted = {int(row["episode"]): float(row[column]) for row in rows if row[column]}
         assert logged == pytest.approx(wanted, rel=1e-6)
+    settings = plugin_data_pb2.HParamsPluginData.FromString(
+        events.SummaryMetadata(SESSION_START_INFO_TAG).plugin_data.content
+    ).session_start_info.hparams
+    assert settings["preset"].string_value == "original"
+    assert settings["hidden_units"].string_value == "8"
+    assert settings["learning_rate"].number_value == 1e-3
     maps = {event.step: event.tensor_proto.string_val for event in events.Tensors("phase plane")}
     assert list(maps) == [0, 42, 50, 51]
     assert tf.io.decode_png(maps[51][2]).shape == (650, 900, 4)
@@ -270,6 +285,13 @@ WRONG = [
     (["train", "--gravity", "nan"], "gravity is nan"),
     (["train", "--learning-rate", "inf"], "learning_rate is inf"),
     (["train", "--double-q", "yes"], "double_q is 'yes'; expected true or false"),
+    (["train", "--evaluate-every", "-1"], "evaluate_every is -1; expected a whole number from 0"),
+    (
+        ["train", "--episodes", "40", "--evaluate-every", "41"],
+        "evaluate_every 41 is larger than the run's 40 episodes",
+    ),
+    (["train", "--keep-best"], "keep_best needs evaluate_every"),
+    (["train", "--keep-best", "yes"], "keep_best is 'yes'; expected true or false"),
     (["train", "--loss", "cubed"], "invalid choice: 'cubed'"),
     (["train", "--update-after", "reset"], "the setting update_after is now train_frequency"),
     (

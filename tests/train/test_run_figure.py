@@ -19,7 +19,7 @@ def picture_size(png: bytes) -> tuple[int, ...]:
     return matplotlib.image.imread(io.BytesIO(png)).shape[:2]
 
 
-def test_run_is_drawn_with_and_without_phase_planes_and_losses() -> None:
+def test_run_is_drawn_with_and_without_phase_planes_losses_and_evaluations() -> None:
     def record(episode: int, loss: float) -> EpisodeRecord:
         return EpisodeRecord(episode, -1.0, -200.0, 0.5, loss, 200 * (episode + 1), episode, 0.1)
 
@@ -33,6 +33,29 @@ def test_run_is_drawn_with_and_without_phase_planes_and_losses() -> None:
     ]
     assert sizes == [(1250, 900)] * 2 + [(600, 900)] * 2
     assert picture_size(run_figure.draw_phase_planes(planes)) == (650, 900)
+    history[19] = history[19]._replace(greedy_regret=3.0)
+    sizes = [
+        picture_size(run_figure.draw_run(history, "Pendulum-v1", returns, planes_or_none))
+        for planes_or_none in (planes, {})
+    ]
+    assert sizes == [(1550, 900), (900, 900)]
+
+
+def test_greedy_regret_is_drawn_by_episode_with_its_best() -> None:
+    regrets = {9: 800.0, 19: 0.0, 29: 20.0, 39: 0.0}
+    evaluated = [
+        EpisodeRecord(i, -1.0, -200.0, 0.5, 0.1, 200, i, 0.1, regret)
+        for i, regret in regrets.items()
+    ]
+    axes = Figure().subplots()
+    run_figure._draw_greedy_regret(axes, evaluated)
+    curve, best = axes.get_lines()
+    assert dict(zip(*map(np.asarray, curve.get_data()), strict=True)) == regrets
+    assert list(np.asarray(best.get_xdata())) == [39]  # the later of two equals
+    assert best.get_label() == "best: 0.00 after episode 39"
+    low, high = axes.get_ylim()
+    assert low < -0.05  # no point is on the frame
+    assert high > 1000
 
 
 @pytest.mark.parametrize(
