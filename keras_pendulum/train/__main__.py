@@ -12,21 +12,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from keras_pendulum.cli import OneLineParser, nonempty_path, run_command, shell_word
+from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
 from keras_pendulum.completion import complete_with, folders, names, weights_files
 from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.display import require_display
-from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
-from keras_pendulum.train.progress_bar import can_draw_bar, make_progress
+from keras_pendulum.train.closing_lines import closing_lines
+from keras_pendulum.train.progress_bar import make_progress
 
 if TYPE_CHECKING:
+    from keras_pendulum.history import EpisodeRecord
     from keras_pendulum.train.live_plot import LivePlot
-    from keras_pendulum.train.run_folder import RunFolder
-    from keras_pendulum.train.train_dqn import TrainingResult
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.train") -> int:
@@ -78,6 +77,7 @@ def _train(arguments: argparse.Namespace) -> int:
     live = _live_plot() if arguments.live else None
 
     with fast_import():
+        from keras_pendulum.evaluate.evaluation import evaluate_policy
         from keras_pendulum.storage.find_weights import find_weights
         from keras_pendulum.storage.weights import load_weights
         from keras_pendulum.train.checkpoint import load_config
@@ -95,25 +95,36 @@ def _train(arguments: argparse.Namespace) -> int:
 
     folder = RunFolder(out, config.environment)
     log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
-    progress = None if arguments.quiet else make_progress(config)
+    progress = make_progress(config, arguments.quiet)
+    new_episodes: list[EpisodeRecord] = []
+    score = None
     started = time.perf_counter()
-    with _Interrupt() as interrupt:
-        result = train_dqn(
-            config,
-            out,
-            init=init,
-            overwrite=arguments.overwrite,
-            resume=arguments.resume,
-            render=arguments.render,
-            listeners=[each for each in (progress, live, log) if each],
-            on_checkpoint=log.on_checkpoint if log else lambda network, episode: None,
-            should_stop=lambda: interrupt.asked,
-        )
-    if live:
-        live.finish()
-    if can_draw_bar() and progress and not result.finished:
-        print()  # ends the line of the bar
-    _print_summary(result, folder, time.perf_counter() - started, score=not interrupt.asked)
+    try:
+        with _Interrupt() as interrupt:
+            result = train_dqn(
+                config,
+                out,
+                init=init,
+                overwrite=arguments.overwrite,
+                resume=arguments.resume,
+                render=arguments.render,
+                listeners=[each for each in (new_episodes.append, progress, live, log) if each],
+                on_checkpoint=log.on_checkpoint if log else lambda network, episode: None,
+                on_phase=progress.show_phase,
+                should_stop=lambda: interrupt.asked,
+            )
+        seconds = time.perf_counter() - started
+        if live:
+            live.finish()
+        if not interrupt.asked:
+            progress.show_phase("evaluating")
+            score = evaluate_policy(result.network)
+        progress.show_phase("finished" if result.finished else "interrupted")
+    finally:
+        progress.end()
+    print(
+        closing_lines(config, result, folder, seconds, new_episodes=len(new_episodes), score=score)
+    )
     return 130 if interrupt.asked else 0
 
 
@@ -144,43 +155,6 @@ class _Interrupt:
     def _ask(self, signum: int, frame: object) -> None:
         self.asked = True
         signal.signal(signal.SIGINT, self._before)
-
-
-def _print_summary(
-    result: TrainingResult, folder: RunFolder, seconds: float, *, score: bool
-) -> None:
-    from keras_pendulum.evaluate.evaluation import evaluate_policy, random_return
-
-    last = result.history[-1]
-    state = "Trained" if result.finished else "Interrupted after"
-    print(
-        f"{state} {last.episode + 1} episodes ({last.environment_steps} steps, {last.updates} "
-        f"updates); this took {seconds:.1f} s."
-    )
-    if score:
-        greedy = evaluate_policy(result.network)
-        print(greedy.summary())
-        steps = TASKS[greedy.environment].steps_per_episode
-        random = random_return(greedy.environment, greedy.gravity, steps)
-        print(f"Uniformly random actions on the same starts: {random:.2f}")
-    saved = ", ".join(file.name for file in folder.files if file.exists())
-    print(f"Saved in {folder.path}: {saved}")
-    print(_next_commands(result, folder))
-
-
-def _next_commands(result: TrainingResult, folder: RunFolder) -> str:
-    weights = shell_word(folder.path / folder.weights.name)
-    if not result.finished:
-        commands = {"Continue": f"train --resume --out {shell_word(folder.path)}"}
-    elif TASKS[result.network.provenance.environment].has_torque:
-        commands = {
-            "Watch it": f"evaluate {weights} --episodes 3 --render",
-            "Play against it": f"play --against {weights}",
-            "Take it to a browser": f"page {weights}",
-        }
-    else:
-        commands = {"Watch it": f"evaluate {weights} --episodes 3 --render"}
-    return "\n".join(f"{what}: python -m keras_pendulum.{do}" for what, do in commands.items())
 
 
 if __name__ == "__main__":

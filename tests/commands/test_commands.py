@@ -24,6 +24,7 @@ import keras_pendulum as kp
 from keras_pendulum.evaluate import __main__ as evaluate
 from keras_pendulum.train import __main__ as train
 from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint
+from keras_pendulum.train.progress import Progress
 from keras_pendulum.train.run import Run
 
 RECORDED = DATA / "pendulum_weight.keras2.h5"
@@ -392,6 +393,23 @@ def test_control_c_after_the_last_episode_saves_the_run_and_skips_evaluation(
     config = kp.preset("original", hidden_units=(8,), episodes=5)
     assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == 5
     assert (tmp_path / "rewards.png").exists()
+
+
+def test_progress_line_ends_before_an_error(
+    in_process: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Bar(Progress):
+        def end(self) -> None:
+            print("the line has ended")
+
+    def diverge(*settings: object, **options: object) -> None:
+        raise kp.UserError("learning has diverged")
+
+    monkeypatch.setattr(train, "make_progress", lambda *settings: Bar())
+    monkeypatch.setattr("keras_pendulum.train.train_dqn.train_dqn", diverge)
+    done = in_process("train")
+    assert (done.returncode, done.stdout) == (2, "the line has ended\n")
+    assert done.stderr == "error: learning has diverged\n"
 
 
 LATIN_1 = {**os.environ, "PYTHONIOENCODING": "latin-1"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import shlex
@@ -44,10 +45,11 @@ def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     shown = bars.split("\r")[1:]
     assert {len(line) for line in shown} == {79}  # a wrapped line is not drawn over
     number = r"-?[\d.e-]+"
-    assert re.fullmatch(
-        rf"43/43 ━+ return {number} regret {number} ε 0.58 loss {number} \d+ steps/s 0:00 left",
-        shown[-1].rstrip(),
-    )
+    figures = rf"return {number} regret {number} ε 0.58( loss {number})?( \d+ steps/s)?"
+    assert re.fullmatch(rf"finished 43/43 ━+ {figures}", shown[-1].rstrip())
+    phases = [name for name, _ in itertools.groupby(line.split()[0] for line in shown)]
+    assert phases == [*("training", "compiling", "training", "drawing", "evaluating", "finished")]
+    assert "0:00 left" not in output.decode()
     assert "\x1b" not in output.decode()
     assert "Episode: " not in output.decode()
     assert "Regret: " in "\n".join(closing)

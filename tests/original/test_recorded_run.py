@@ -189,9 +189,16 @@ def test_train_command_prints_the_recorded_lines(command: Command, tmp_path: Pat
         *("--episodes", str(STRICT_EPISODES)),
     )
     assert done.returncode == 0, done.stderr
-    printed = done.stdout.splitlines()[:STRICT_EPISODES]
+    output = done.stdout.splitlines()
+    printed = [line for line in output if line.startswith("Episode: ")]
     with strict_where_tried(printed, lines):
         assert printed == lines[:STRICT_EPISODES]
+    # Beside them, there is only a line with the regret after every 50 episodes.
+    others = [line for line in output[: STRICT_EPISODES + 2] if line not in printed]
+    assert [line.split(",")[0] for line in others] == [
+        "Mean of episodes 40 to 49",
+        "Mean of episodes 90 to 99",
+    ]
 
 
 def test_example_original_prints_the_recorded_lines() -> None:

@@ -1,103 +1,249 @@
+"""The progress bar: its figures, its phases, and the terminals that it fits."""
+
 from __future__ import annotations
 
 import io
 import re
 import sys
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.train.progress import Progress
 from keras_pendulum.train.progress_bar import make_progress
 
 STEPS = 50  # per episode, in 0.5 s
 
 
-def record(episode: int) -> EpisodeRecord:
+def record(episode: int, **changes: Any) -> EpisodeRecord:
     episode_return = -float((episode + 1) ** 2)
     steps = STEPS * (episode + 1)
-    return EpisodeRecord(
+    one = EpisodeRecord(
         episode, episode_return / STEPS, episode_return, 0.5, 0.1, steps, episode, 0.5
     )
-
-
-def printed_figures(
-    optimum: float, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> list[str]:
-    """Returns the text beside the bar after each of the first 13 of 100 episodes."""
-    monkeypatch.setattr("keras_pendulum.train.progress_bar._SECONDS_BETWEEN_DRAWINGS", 0.0)
-    monkeypatch.setattr(
-        "keras_pendulum.evaluate.evaluation.optimal_training_return", lambda config: optimum
-    )
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("COLUMNS", "200")
-    listener = make_progress(kp.preset("reference", episodes=100))
-    for episode in range(13):
-        listener(record(episode))
-    lines = capsys.readouterr().out.split("\r")[1:]
-    return [line.split(" ", 2)[2].rstrip() for line in lines]
-
-
-def test_bar_shows_regret_and_speed_of_the_last_10_episodes(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    lines = printed_figures(-4.0, monkeypatch, capsys)
-    mean = sum(i**2 for i in range(4, 14)) / 10
-    assert lines[-1] == (
-        f"return -169 regret {mean - 4:.4g} ε 0.50 loss 0.1 {STEPS / 0.5:.0f} steps/s 0:44 left"
-    )
-    # The first record of a resumed run does not say how many steps were made before it.
-    assert lines[0] == "return -1 regret -3 ε 0.50 loss 0.1 0:50 left"
-
-
-def test_bar_shows_no_regret_without_a_known_optimum(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert "regret" not in "".join(printed_figures(float("nan"), monkeypatch, capsys))
+    return one._replace(**changes)
 
 
 class Terminal(io.TextIOWrapper):
     def isatty(self) -> bool:
         return True
 
+    def lines(self) -> list[str]:
+        """Returns each line that was drawn, without the spaces at its end."""
+        self.flush()
+        assert isinstance(self.buffer, io.BytesIO)
+        text = self.buffer.getvalue().decode(self.encoding)
+        return [line.rstrip() for line in text.split("\r")[1:]]
 
-def drawn(encoding: str, term: str, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Returns the output for 1 and 2 of 2 episodes on a terminal of 60 columns."""
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Terminal]:
+    """Returns a function that makes the output a terminal whose bar is drawn at each episode."""
+
+    def make(columns: int = 200, encoding: str = "utf-8", term: str = "xterm") -> Terminal:
+        output = Terminal(io.BytesIO(), encoding=encoding, errors="replace", newline="")
+        monkeypatch.setattr(sys, "stdout", output)
+        monkeypatch.setattr("keras_pendulum.train.progress_bar._SECONDS_BETWEEN_DRAWINGS", 0.0)
+        monkeypatch.setenv("TERM", term)
+        monkeypatch.setenv("COLUMNS", str(columns))
+        set_optimum(-4.0, monkeypatch)
+        return output
+
+    return make
+
+
+def set_optimum(optimum: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "keras_pendulum.evaluate.evaluation.optimal_training_return", lambda config: -4.0
+        "keras_pendulum.evaluate.evaluation.optimal_training_return", lambda config: optimum
     )
-    output = Terminal(io.BytesIO(), encoding=encoding, errors="replace", newline="")
-    monkeypatch.setattr(sys, "stdout", output)
-    monkeypatch.setattr("keras_pendulum.train.progress_bar._SECONDS_BETWEEN_DRAWINGS", 0.0)
-    monkeypatch.setenv("TERM", term)
-    monkeypatch.setenv("COLUMNS", "60")
-    listener = make_progress(kp.preset("reference", episodes=2))
-    for episode in range(2):
-        listener(record(episode)._replace(seconds=3600.0 * (2 - episode)))
+
+
+def figures(line: str) -> str:
+    """Returns the text beside the bar."""
+    return line.split(" ", 3)[3]
+
+
+def test_bar_shows_regret_and_speed_of_the_last_10_episodes(
+    terminal: Callable[..., Terminal],
+) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=100))
+    for episode in range(13):
+        bar(record(episode))
+    lines = output.lines()
+    mean = sum(i**2 for i in range(4, 14)) / 10
+    speed = f"{STEPS / 0.5:.0f} steps/s"
+    assert lines[-1].startswith("training 13/100 ━━")
+    assert figures(lines[-1]) == (
+        f"return -169 regret {mean - 4:.4g} ε 0.50 loss 0.1 {speed} 0:44 left"
+    )
+    assert figures(lines[0]) == f"return -1 regret -3 ε 0.50 loss 0.1 {speed} 0:50 left"
+
+
+def test_resumed_run_shows_its_speed_after_10_episodes(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=100))
+    for episode in range(50, 61):
+        bar(record(episode))
+    lines = output.lines()
+    assert ["steps/s" in line for line in lines] == [False] * 10 + [True]
+    assert "100 steps/s" in lines[-1]
+
+
+def test_bar_shows_no_regret_without_a_known_optimum(
+    terminal: Callable[..., Terminal], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = terminal()
+    set_optimum(float("nan"), monkeypatch)
+    make_progress(kp.preset("reference", episodes=100))(record(0))
+    assert "regret" not in "".join(output.lines())
+
+
+def test_time_left_is_shown_from_the_second_episode_with_updates(
+    terminal: Callable[..., Terminal],
+) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=100))
+    bar(record(0, loss=float("nan"), seconds=0.01))
+    bar.show_phase("compiling")
+    bar(record(1, seconds=90.0))
+    bar(record(2, seconds=2.0))
+    assert [re.findall(r"\d+:\d+ left", line) for line in output.lines()] == [
+        *([], [], [], ["3:14 left"])
+    ]
+
+
+def test_time_left_is_never_0(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=5))
+    for episode in range(5):
+        bar(record(episode, seconds=1e-4))
+    for phase in ("drawing", "evaluating", "finished"):
+        bar.show_phase(phase)
+    lines = output.lines()
+    assert [re.findall(r"\d+:\d+ left", line) for line in lines] == [
+        *([["0:01 left"]] * 4),
+        *([[]] * 4),
+    ]
+    assert [line.split()[0] for line in lines[4:]] == [
+        *("training", "drawing", "evaluating", "finished")
+    ]
+
+
+def test_time_left_includes_the_remaining_evaluations(
+    terminal: Callable[..., Terminal], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = SimpleNamespace(now=100.0)
+    clock.monotonic = lambda: clock.now
+    monkeypatch.setattr("keras_pendulum.train.progress_bar.time", clock)
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=50, evaluate_every=10))
+    for episode in range(9):
+        bar(record(episode))
+    bar.show_phase("evaluating")
+    clock.now += 30.0
+    bar(record(9, greedy_regret=12.345))
+    lines = output.lines()
+    assert lines[-2].startswith("evaluating 9/50 ")
+    assert lines[-1].startswith("training 10/50 ")
+    assert "greedy 12.35 " in lines[-1]
+    assert lines[-1].endswith("2:20 left")  # 40 episodes of 0.5 s and 4 evaluations of 30 s
+    bar(record(10))
+    assert "greedy 12.35 " in output.lines()[-1]
+
+
+def test_phase_before_the_first_episode_is_shown(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=2))
+    bar.show_phase("drawing")
+    bar.end()
+    assert output.lines() == ["drawing"]
+
+
+def test_interrupted_run_has_no_time_left(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=9))
+    bar(record(0))
+    bar.show_phase("interrupted")
+    assert output.lines()[-1].startswith("interrupted 1/9 ")
+    assert "left" not in output.lines()[-1]
+
+
+def test_end_ends_the_line_once(terminal: Callable[..., Terminal]) -> None:
+    output = terminal(columns=60)
+    bar = make_progress(kp.preset("reference", episodes=9))
+    bar.end()
+    bar(record(0))
+    bar.end()
+    bar.end()
     output.flush()
     assert isinstance(output.buffer, io.BytesIO)
-    return output.buffer.getvalue().decode(encoding)
+    assert output.buffer.getvalue().endswith(b"\n")
+    assert output.buffer.getvalue().count(b"\n") == 1
 
 
-def test_bar_needs_no_escape_codes(monkeypatch: pytest.MonkeyPatch) -> None:
-    longer, shorter = drawn("utf-8", "xterm", monkeypatch).removesuffix("\n").split("\r")[1:]
+def test_narrow_terminal_leaves_out_the_least_important_figures(
+    terminal: Callable[..., Terminal],
+) -> None:
+    shown = []
+    for columns in (90, 80, 70, 60, 50):
+        output = terminal(columns)
+        make_progress(kp.preset("reference", episodes=100))(record(0, greedy_regret=9.0))
+        (line,) = output.lines()
+        assert len(line) < columns
+        assert line.endswith("regret -3 greedy 9 0:50 left") or "ε" in line
+        shown.append([name for name in ("return", "ε", "loss", "steps/s", "left") if name in line])
+    assert shown == [
+        ["return", "ε", "loss", "steps/s", "left"],
+        ["return", "ε", "loss", "left"],
+        ["return", "ε", "left"],
+        ["return", "left"],
+        ["left"],
+    ]
+
+
+def drawn(output: Terminal) -> str:
+    """Returns the output for 1 and 2 of 2 episodes, the first with the longer line."""
+    bar = make_progress(kp.preset("reference", episodes=2))
+    for episode in range(2):
+        bar(record(episode, seconds=3600.0 * (2 - episode)))
+    output.flush()
+    assert isinstance(output.buffer, io.BytesIO)
+    return output.buffer.getvalue().decode(output.encoding)
+
+
+def test_bar_needs_no_escape_codes(terminal: Callable[..., Terminal]) -> None:
+    longer, shorter = drawn(terminal(columns=60)).split("\r")[1:]
     assert (longer + shorter).isprintable()
     assert len(longer) == len(shorter) == 59  # nothing of the longer line is left
-    assert longer.startswith("1/2 ━━")
+    assert longer.startswith("training 1/2 ━━")
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
 def test_bar_has_other_marks_where_the_code_page_lacks_them(
-    encoding: str, monkeypatch: pytest.MonkeyPatch
+    encoding: str, terminal: Callable[..., Terminal]
 ) -> None:
-    before, after = drawn(encoding, "xterm", monkeypatch).split("\r")[1:]
-    assert before.startswith("1/2 ##")
-    assert re.fullmatch(r"#+-+", before.split()[1])
-    assert re.fullmatch(r"#+", after.split()[1])
+    before, after = drawn(terminal(60, encoding)).split("\r")[1:]
+    assert before.startswith("training 1/2 ##")
+    assert re.fullmatch(r"#+-+", before.split()[2])
+    assert re.fullmatch(r"#+", after.split()[2])
 
 
-def test_dumb_terminal_gets_a_line_for_each_episode(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert drawn("utf-8", "dumb", monkeypatch) == "".join(
+def test_dumb_terminal_gets_a_line_for_each_episode(terminal: Callable[..., Terminal]) -> None:
+    assert drawn(terminal(term="dumb")) == "".join(
         f"{record(episode).line()}\n" for episode in range(2)
     )
+
+
+def test_quiet_run_shows_nothing(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    progress = make_progress(kp.preset("reference", episodes=2), quiet=True)
+    assert type(progress) is Progress
+    progress(record(0))
+    progress.show_phase("drawing")
+    progress.end()
+    assert output.lines() == []

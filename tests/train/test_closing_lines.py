@@ -1,0 +1,189 @@
+"""The lines after a run: what was learned, why not, and what to do next."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import Command
+
+import keras_pendulum as kp
+from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.train import evaluations
+from keras_pendulum.train.closing_lines import closing_lines
+from keras_pendulum.train.run_folder import RunFolder
+
+
+def record(episode: int, updates: int, **changes: Any) -> EpisodeRecord:
+    steps = 200 * (episode + 1)
+    return EpisodeRecord(episode, -1.0, -200.0, 0.5, 0.1, steps, updates, 0.1)._replace(**changes)
+
+
+def lines_after(
+    config: kp.Config,
+    last: EpisodeRecord,
+    folder: Path,
+    *,
+    score: kp.Score | None = None,
+    new_episodes: int = 1,
+    finished: bool = True,
+) -> list[str]:
+    result = kp.TrainingResult(kp.DQN((8,)), [last], finished)
+    run_folder = RunFolder(folder, config.environment)
+    return closing_lines(
+        config, result, run_folder, 1.5, new_episodes=new_episodes, score=score
+    ).splitlines()
+
+
+def warnings(config: kp.Config, last: EpisodeRecord, mean_return: float, folder: Path) -> list[str]:
+    """Returns the lines between the return of random actions and the list of the files."""
+    optimum = -36.68 if config.gravity is not None else 500.0
+    score = kp.Score(
+        config.environment, config.gravity, np.array([mean_return]), np.array([optimum])
+    )
+    lines = lines_after(config, last, folder, score=score)
+    first = next(i for i, line in enumerate(lines) if line.startswith("Uniformly random")) + 1
+    return lines[first : next(i for i, line in enumerate(lines) if line.startswith("Saved in"))]
+
+
+NO_UPDATE = [
+    (
+        kp.preset("reference", episodes=40, warmup_episodes=41),
+        record(39, 0),
+        "the first one comes after episode 41, and the run has the episodes 0 to 39. Continue it "
+        "with more episodes (--resume --episodes N), or start another one with a smaller "
+        "--warmup-episodes (now 41)",
+    ),
+    (
+        kp.preset("cartpole-original", episodes=3),
+        record(2, 0, environment_steps=70),
+        "its 70 transitions are fewer than one batch. Continue it with more episodes "
+        "(--resume --episodes N), or start another one with a smaller --batch-size (now 128)",
+    ),
+    (
+        kp.preset("cartpole", episodes=3, warmup_episodes=1),
+        record(2, 0, environment_steps=70),
+        "its 70 transitions are fewer than one batch. Continue it with more episodes "
+        "(--resume --episodes N), or start another one with a smaller --batch-size (now 128)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("config", "last", "reason"), NO_UPDATE)
+def test_run_without_updates_says_why(
+    config: kp.Config, last: EpisodeRecord, reason: str, tmp_path: Path
+) -> None:
+    for mean_return in (-2000.0, 0.0):  # also where the policy is not worse than random actions
+        assert warnings(config, last, mean_return, tmp_path) == [
+            f"The policy has learned nothing, because the run made no update: {reason}"
+        ]
+
+
+WORSE = [
+    (
+        kp.preset("walkthrough"),
+        record(399, 359),
+        "With truncated indices, the values of two torques are never learned: try --stored-index "
+        "exact",
+    ),
+    (
+        kp.preset("reference", updates_per_episode=1),
+        record(499, 459),
+        "It had 459 updates in 100000 steps, which is little: try a larger --updates-per-episode "
+        f"(now 1; reference has {kp.Config.updates_per_episode})",
+    ),
+    (
+        kp.preset("cartpole", episodes=60),
+        record(59, 2000),
+        "It had 60 episodes; the preset cartpole has "
+        f"{kp.preset('cartpole').episodes}: continue with --resume --episodes "
+        f"{kp.preset('cartpole').episodes}",
+    ),
+    (
+        kp.preset("reference", learning_rate_schedule="constant"),
+        record(kp.Config.episodes - 1, 13770),
+        "With a constant learning rate, the policy of the last episode may be a bad one: try "
+        "--learning-rate-schedule cosine",
+    ),
+    (
+        kp.preset("reference", learning_rate=0.5),
+        record(kp.Config.episodes - 1, 13770),
+        "Learning may have diverged: try a smaller --learning-rate (now 0.5) or another --seed",
+    ),
+    (
+        kp.preset("cartpole-original"),  # its schedule cannot be the cosine
+        record(599, 70000),
+        "Learning may have diverged: try a smaller --learning-rate (now 0.0001) or another --seed",
+    ),
+]
+
+
+@pytest.mark.parametrize(("config", "last", "reason"), WORSE)
+def test_policy_worse_than_random_actions_says_why(
+    config: kp.Config, last: EpisodeRecord, reason: str, tmp_path: Path
+) -> None:
+    bad, good = (-1500.0, -40.0) if config.gravity is not None else (9.4, 300.0)
+    assert warnings(config, last, bad, tmp_path) == [
+        f"The policy is worse than random actions. {reason}"
+    ]
+    assert warnings(config, last, good, tmp_path) == []
+
+
+def test_interrupted_run_is_not_judged_and_can_be_continued(tmp_path: Path) -> None:
+    config = kp.preset("reference")
+    lines = lines_after(config, record(3, 0), tmp_path, finished=False)
+    assert lines[0] == "Interrupted after 4 episodes (800 steps, 0 updates); this took 1.5 s."
+    assert [line.split(":")[0].split(" in ")[0] for line in lines[1:]] == ["Saved", "Continue"]
+
+
+def test_evaluations_are_summed_up(tmp_path: Path) -> None:
+    config = kp.preset("reference", evaluate_every=50, keep_best=True)
+    regrets = [(49, 30.0), (99, 2.345), (149, 2.345), (199, 3.0)]
+    history = [record(i, 100, greedy_regret=regret) for i, regret in regrets]
+    result = kp.TrainingResult(kp.DQN((8,)), history, True)
+    folder = RunFolder(tmp_path, config.environment)
+    folder.best.touch()
+    lines = closing_lines(config, result, folder, 1.5, new_episodes=1, score=None).splitlines()
+    assert lines[1] == (
+        "Evaluated 4 times on the starts of seeds 900 to 949: best regret 2.35 after episode 149, "
+        "last 3.00"
+    )
+    assert lines[2].endswith(": pendulum_weight_best.h5")
+    assert lines[3].startswith("Evaluate the best weights: python -m keras_pendulum.evaluate ")
+    assert lines[3].endswith("pendulum_weight_best.h5")
+
+
+def test_finished_run_that_is_resumed_says_how_to_extend_it(
+    in_process: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(evaluations, "SEEDS", range(900, 902))
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "3", "--out", "my run"]
+    words += ["--evaluate-every", "2", "--keep-best"]
+    first = in_process("train", *words).stdout.splitlines()
+    assert not [line for line in first if "Nothing is left" in line or "Extend it" in line]
+    before = (tmp_path / "my run" / "history.csv").read_bytes()
+    again = in_process("train", "--resume", "--out", "my run")
+    assert again.returncode == 0, again.stderr
+    lines = again.stdout.splitlines()
+    assert lines[0] == (
+        "Nothing is left to train: this run has all of its 3 episodes (600 steps, 0 updates)."
+    )
+    assert (tmp_path / "my run" / "history.csv").read_bytes() == before
+    (extend,) = (line for line in lines if line.startswith("Extend it: "))
+    extended = in_process("train", *shlex.split(extend)[5:])
+    assert extended.returncode == 0, extended.stderr
+    assert extended.stdout.startswith("Episode: 3, ")
+    assert "Trained 6 episodes" in extended.stdout
+    assert "Greedy policy after episode 5: regret " in extended.stdout
+
+
+def test_untrained_run_says_so_at_its_end(in_process: Command) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--quiet"]
+    lines = in_process("train", *words).stdout.splitlines()
+    (line,) = (line for line in lines if "learned nothing" in line)
+    assert "--warmup-episodes (now 41)" in line
+    assert not math.isnan(float(lines[lines.index(line) - 1].rsplit(" ", 1)[1]))
