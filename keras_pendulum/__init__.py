@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.import_hooks import add_import_hooks
+from keras_pendulum.keras_registration import register_with_keras
 from keras_pendulum.tensorflow_setup import (
     fast_import,
     require_tensorflow,
@@ -62,7 +62,7 @@ _MODULES = {
 }
 
 set_environment_defaults()
-add_import_hooks("keras_pendulum.dqn.network")
+register_with_keras()
 
 
 def __getattr__(name: str) -> Any:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+import re
 import sys
 import warnings
 from collections.abc import Iterator
+from typing import IO
 
 from keras_pendulum.errors import UserError
 
@@ -20,6 +22,8 @@ _ENVIRONMENT = {
     "TF_ENABLE_ONEDNN_OPTS": "0",
     "TF_CPP_MIN_LOG_LEVEL": "3",  # no start-up notes
 }
+# A line of the C++ library absl, such as "I0000 00:00:1795466974.767995    4604 port.cc:153] …".
+_NOTE = re.compile(rb"WARNING: All log messages before absl::|[IWE]\d+ [\d:.]+ +\d+ [^ ]+:\d+\] ")
 _ROUNDING = ("TF_NUM_INTRAOP_THREADS", "TF_ENABLE_ONEDNN_OPTS")
 # Whether the user has imported TensorFlow before this package, and without a choice of both.
 _IMPORTED_BEFORE = "tensorflow" in sys.modules
@@ -73,7 +77,7 @@ def require_tensorflow() -> None:
 
 @contextlib.contextmanager
 def fast_import() -> Iterator[None]:
-    """Pauses garbage collection while TensorFlow and Keras are imported.
+    """Imports TensorFlow and Keras in its `with` block, without garbage collection and notes.
 
     Their import creates so many permanent objects that collecting takes two fifths of its time
     (benchmarks/import_time.py).
@@ -81,9 +85,40 @@ def fast_import() -> Iterator[None]:
     imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
     gc.disable()
     try:
-        yield
+        with contextlib.nullcontext() if imported else _without_notes():
+            yield
     finally:
         if enabled:
             gc.enable()
         if not imported and "tensorflow" in sys.modules:
             gc.freeze()  # permanent objects are not examined again
+
+
+@contextlib.contextmanager
+def _without_notes() -> Iterator[None]:
+    """Removes TensorFlow's notes about GPUs from the standard error in its `with` block.
+
+    TensorFlow prints them before it reads TF_CPP_MIN_LOG_LEVEL. All other lines are printed when
+    the block ends. A user's own choice of that variable keeps the notes.
+    """
+    import tempfile
+
+    if os.environ.get("TF_CPP_MIN_LOG_LEVEL") != _ENVIRONMENT["TF_CPP_MIN_LOG_LEVEL"]:
+        yield
+        return
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # no file can be written, or standard error is closed
+            lines = stack.enter_context(tempfile.TemporaryFile())
+            stack.callback(_print_all_but_notes, lines, os.dup(2))
+            os.dup2(lines.fileno(), 2)
+        yield
+
+
+def _print_all_but_notes(lines: IO[bytes], stderr: int) -> None:
+    """Restores the standard error from its duplicate, and prints the lines that are no notes."""
+    os.dup2(stderr, 2)
+    os.close(stderr)
+    lines.seek(0)
+    for line in lines:
+        if not _NOTE.match(line):
+            os.write(2, line)

@@ -104,3 +104,76 @@ def test_first_use_of_a_public_name_imports_without_garbage_collection() -> None
         "assert not collections and gc.isenabled() and gc.get_freeze_count() > 100_000\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+NOTES = """\
+WARNING: All log messages before absl::InitializeLog() is called are written to STDERR
+I0000 00:00:1795466974.767995    4604 cudart_stub.cc:31] Could not find cuda drivers on your machine
+W0000 00:00:1795466974.767996    4604 computation_placer.cc:177] already registered
+E0000 00:00:1795466974.767997    4604 cuda_fft.cc:467] Unable to register cuFFT factory
+"""
+OTHERS = """\
+F0000 00:00:1795466974.767998    4604 cpu_feature_guard.cc:100] compiled to use AVX instructions
+Error: I0000 is not a note
+I am a line of the user's program
+"""
+
+
+def write_in_fast_import(before: str = "", then: str = "", **environment: str) -> str:
+    """Writes NOTES and OTHERS as C++ code does, while `fast_import`; returns what is printed."""
+    code = f"""
+import os, sys, keras_pendulum
+from keras_pendulum.tensorflow_setup import fast_import
+{before}
+with fast_import():
+    os.write(2, {(NOTES + OTHERS).encode()!r})
+    {then}
+os.write(2, b"I0000 1 2 a.cc:3] a note later")
+"""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=clean | environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+        check=False,
+    )
+    return done.stdout
+
+
+@pytest.mark.quick
+def test_notes_of_tensorflow_are_removed_and_nothing_else() -> None:
+    assert write_in_fast_import() == f"{OTHERS}I0000 1 2 a.cc:3] a note later"
+
+
+@pytest.mark.quick
+def test_notes_remain_with_the_users_own_log_level() -> None:
+    assert write_in_fast_import(TF_CPP_MIN_LOG_LEVEL="0").startswith(NOTES + OTHERS)
+
+
+@pytest.mark.quick
+def test_notes_remain_of_a_tensorflow_that_is_imported_already() -> None:
+    before = "sys.modules['tensorflow'] = os"
+    assert write_in_fast_import(before).startswith(NOTES + OTHERS)
+
+
+@pytest.mark.quick
+def test_other_lines_of_a_failing_import_are_printed_before_its_error() -> None:
+    printed = write_in_fast_import(then="raise ImportError('a broken TensorFlow')")
+    assert printed.startswith(f"{OTHERS}Traceback")
+    assert printed.endswith("ImportError: a broken TensorFlow\n")
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    "before",
+    ["os.dup2(1, 7); os.close(2)", "import tempfile; tempfile.tempdir = '/no/such/folder'"],
+    ids=["standard error closed", "no file can be written"],
+)
+def test_import_succeeds_where_notes_cannot_be_removed(before: str) -> None:
+    then = "os.write(1, b'imported')"
+    if "close" in before:
+        before += "; os.write = lambda file, text: None if file == 2 else os.writev(file, [text])"
+    assert "imported" in write_in_fast_import(before, then)

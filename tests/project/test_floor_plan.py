@@ -18,7 +18,7 @@ ROOMS = (
     *("storage", "dqn", "config", "environments"),
 )
 WITHOUT_ROOM = (
-    *("cli", "completion", "display", "import_hooks", "tensorflow_setup"),
+    *("cli", "completion", "display", "keras_registration", "tensorflow_setup"),
     *("history", "version", "errors"),
 )
 ORDER = ("__main__", *ROOMS, *WITHOUT_ROOM)
