@@ -67,7 +67,9 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 def _train(arguments: argparse.Namespace) -> int:
     settings = settings_from_args(arguments)
-    config = preset(arguments.preset or "reference", **settings)
+    # The settings of a resumed run are in its checkpoint, so these only name its folder.
+    used = {name: settings[name] for name in settings if name == "seed" or not arguments.resume}
+    config = preset(arguments.preset or "reference", **used)
     out = Path(arguments.out or Path("runs") / f"{config.preset}-seed{config.seed}")
     if arguments.resume and arguments.init:
         raise UserError("--init starts a new run, --resume continues one: give only one of them")

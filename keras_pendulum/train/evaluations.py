@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -46,20 +46,24 @@ class BestWeights:
 
     Args:
         path: the file; it may not exist yet.
+        history: the records of the run so far.
 
-    Raises WeightsError when the file is damaged or records no regret.
+    Raises WeightsError when the file is damaged, or when it records no evaluation of this run.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, history: Sequence[EpisodeRecord]) -> None:
         self._path = path
         self._regret = math.inf
         if path.exists():
             with open_h5(path) as file:
-                if "evaluation/regret" not in file:
-                    raise WeightsError(
-                        f"{path}: holds weights without an evaluation; move it to another folder"
-                    )
-                self._regret = float(file.read("evaluation/regret"))
+                names = ("evaluation/episode", "evaluation/regret")
+                found = [float(file.read(name)) for name in names if name in file]
+            if found not in [[record.episode, record.greedy_regret] for record in history]:
+                raise WeightsError(
+                    f"{path}: its weights are not those of an evaluation of this run; move it to "
+                    "another folder"
+                )
+            self._regret = found[1]
 
     def are_beaten_by(self, record: EpisodeRecord) -> bool:
         """Returns whether an evaluation is as good as the best one; the later of two equals wins.

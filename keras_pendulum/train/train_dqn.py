@@ -104,7 +104,7 @@ def train_dqn(
         if folder is None:
             finished = _train(run, hooks)
         else:
-            best = BestWeights(folder.best) if config.keep_best else None
+            best = BestWeights(folder.best, run.history) if config.keep_best else None
             folder.start_files(config, run.history)
             finished = _train_in_folder(run, folder, best, hooks)
     return TrainingResult(run.agent.online, run.history, finished)

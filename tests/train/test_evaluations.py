@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import assert_same
+from conftest import Command, assert_same
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
@@ -267,25 +267,26 @@ def test_run_that_asks_later_for_its_best_weights_begins_with_its_last_evaluatio
     assert_weights(best, weights[3])
 
 
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [(b"damaged", "not an HDF5 file"), (None, "weights without an evaluation; move it to another")],
-)
+@pytest.mark.parametrize("content", ["damaged", "weights alone", "of another run"])
 def test_other_file_in_place_of_the_best_weights_stops_a_resumed_run(
-    content: bytes | None, message: str, tmp_path: Path
+    content: str, tmp_path: Path
 ) -> None:
     config = kp.preset("original", episodes=2, evaluate_every=1, keep_best=True, **SMALL)
-    kp.train_dqn(config, tmp_path)
-    best = tmp_path / "pendulum_weight_best.h5"
-    if content is None:
+    kp.train_dqn(config, tmp_path / "run")
+    best = tmp_path / "run" / "pendulum_weight_best.h5"
+    if content == "damaged":
+        best.write_bytes(b"damaged")
+    elif content == "weights alone":
         kp.save_weights(kp.DQN((8,)), best)
     else:
-        best.write_bytes(content)
-    before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+        kp.train_dqn(replace(config, seed=1), tmp_path / "other")
+        (tmp_path / "other" / best.name).replace(best)
+    before = {file: file.read_bytes() for file in best.parent.iterdir()}
+    message = "not an HDF5 file" if content == "damaged" else "not those of an evaluation of this"
     with pytest.raises(kp.WeightsError, match=message) as caught:
-        kp.train_dqn(config, tmp_path, resume=True)
+        kp.train_dqn(config, tmp_path / "run", resume=True)
     assert "\n" not in str(caught.value)
-    assert {file: file.read_bytes() for file in tmp_path.iterdir()} == before
+    assert {file: file.read_bytes() for file in best.parent.iterdir()} == before
 
 
 def test_best_weights_need_a_folder() -> None:
@@ -307,3 +308,21 @@ def test_phases_are_announced_before_they_begin(tmp_path: Path) -> None:
     events.clear()
     kp.train_dqn(replace(config, episodes=6), tmp_path, resume=True, on_phase=events.append)
     assert events == ["compiling", "evaluating", "drawing"]
+
+
+def test_command_resumes_a_run_with_other_evaluations(in_process: Command, tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--out", "run", "--quiet"]
+    done = in_process("train", *words, "--episodes", "2", "--evaluate-every", "1")
+    assert done.returncode == 0, done.stderr
+    # The checkpoint's settings count: first its episodes, then its evaluate_every.
+    resumed = ["--resume", "--out", "run"]
+    long = str(kp.preset("reference").episodes + 1)
+    done = in_process("train", *resumed, "--evaluate-every", long)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(
+        f"error: evaluate_every {long} is larger than the run's 2 episodes"
+    )
+    done = in_process("train", *resumed, "--episodes", "3", "--keep-best")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run" / "pendulum_weight_best.h5").exists()
+    assert [row["greedy_regret"] != "" for row in rows_of(tmp_path / "run")] == [True] * 3
