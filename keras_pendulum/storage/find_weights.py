@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from keras_pendulum.errors import WeightsError
-from keras_pendulum.storage.shipped_weights import shipped_folders
+from keras_pendulum.errors import WeightsError, did_you_mean
+from keras_pendulum.storage.shipped_weights import shipped_folders, shipped_names
 
 
 def find_weights(name: str | os.PathLike[str]) -> Path:
@@ -26,4 +26,5 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
             if path.name == name and candidate.is_file():
                 return candidate
     problem = "not a file" if path.exists() else "no such file"
-    raise WeightsError(f"{name}: {problem}; expected a weights file (.h5)")
+    meant = did_you_mean(name, shipped_names())
+    raise WeightsError(f"{name}: {problem}; expected a weights file (.h5){meant}")
