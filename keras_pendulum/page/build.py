@@ -7,16 +7,18 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import re
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from keras_pendulum.dqn.network import DQN
+from keras_pendulum.dqn.network import DQN, Provenance
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.evaluate.evaluation import evaluation_gravity
 from keras_pendulum.storage.weights import recorded_return
+from keras_pendulum.version import __version__
 
 _WEB = resources.files("keras_pendulum.page") / "web"
 
@@ -43,9 +45,20 @@ def build_page(network: DQN, path: Path, gravity: float | None = None) -> bytes:
         "evaluatedReturn": recorded_return(path),
         "sizes": [network.observation_size, *network.hidden_units, network.action_count],
         "activation": network.activation,
+        "rewardScale": _reward_scale(provenance),
+        "version": __version__,
         "weights": base64.b64encode(weights).decode(),
     }
     return _fill(content).encode()
+
+
+def _reward_scale(provenance: Provenance) -> float:
+    """Returns the factor on the rewards of the recorded run; 1 if the file records none."""
+    try:
+        scale = float(json.loads(provenance.config or "{}")["reward_scale"])
+    except (ValueError, TypeError, KeyError, OverflowError):
+        return 1.0
+    return scale if math.isfinite(scale) and scale > 0 else 1.0
 
 
 def _fill(content: dict[str, Any]) -> str:

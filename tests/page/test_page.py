@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import time
@@ -24,6 +25,7 @@ from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import TorqueGrid
 from keras_pendulum.environments.tasks import make_environment
 from keras_pendulum.page import __main__ as page_command
+from keras_pendulum.version import __version__
 
 TOLERANCE = 1e-4
 TIE = 1e-5  # floating-point rounding may change the order of Q-values closer than this
@@ -471,14 +473,46 @@ def test_every_torque_has_a_bar_and_the_highest_is_the_greedy_one(
     player.run("pendulum.reset(2, 1)")
     state = player.state()
     picture = player.picture("bars")
-    left, right = 62, picture.shape[1] - 6
+    left, right = 76, picture.shape[1] - 6
     middles = left + (np.arange(41) + 0.5) * (right - left) / 41
     tops = np.array([np.nonzero(picture[13:, round(m), 3])[0][0] for m in middles])
     q = np.array(state["qValues"])
     assert state["best"] == q.argmax()
     assert tops[state["best"]] == tops.min()  # another bar may have the same height in pixels
-    heights = (q - q.min()) / np.ptp(q)
-    np.testing.assert_allclose(1 - tops / tops.max(), heights, atol=0.03)
+    lowest, highest = player.run("return pendulum.page.limits")
+    scale = reward_scale(kp.find_weights("swingup"))
+    heights = (q / scale - lowest) / (highest - lowest)
+    floor = picture.shape[0] - 38 - 4 - 13  # a bar for the lowest value has 4 px
+    np.testing.assert_allclose(1 - (tops + 1) / (floor + 1), heights, atol=0.03)
+    value = player.text("best").split(": ")[1].replace("−", "-")
+    assert float(value) == pytest.approx(
+        q.max() / reward_scale(kp.find_weights("swingup")), abs=0.01
+    )
+
+
+def reward_scale(path: Path) -> float:
+    """Returns the factor on the rewards in the settings that a weights file records."""
+    config = json.loads(kp.load_weights(path).provenance.config or "{}")
+    return float(config["reward_scale"])
+
+
+def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+
+    def limits(low: float, high: float, before: list[float] | None) -> list[float]:
+        found: list[float] = player.run(
+            "return steadyLimits([arguments[0], arguments[1]], arguments[2])", low, high, before
+        )
+        return found
+
+    assert limits(-13.2, -2.4, None) == [-15, 0]
+    assert limits(-11, -8, [-15, 0]) == [-15, 0]
+    assert limits(-11, -8.5, [-15, 0]) == [-11, -8]
+    assert limits(-15.1, -2.4, [-15, 0]) == [-20, 0]
+    low, high = limits(-1, -1, None)  # equal values need an axis too
+    assert low <= -1 <= high and low < high
 
 
 def test_damaged_page_shows_one_line(pages: dict[str, str], player: Player, tmp_path: Path) -> None:
@@ -496,10 +530,10 @@ def test_page_describes_its_network(pages: dict[str, str], player: Player) -> No
     player.open(pages["reference"])
     assert player.text("about") == (
         "reference.h5, a 512-256-128 tanh network with 41 torques, on Pendulum-v1 with g = 1 m/s². "
-        f"Mean return when evaluated: −{-evaluated:.2f}."
+        f"Mean return when evaluated: −{-evaluated:.2f}. Written by keras_pendulum {__version__}."
     )
     player.open(pages["small"])
     assert player.text("about") == (
         "<!--<script>&.h5 (preset mine), a 24-7 relu network with 16 torques, on Pendulum-v1 with "
-        "g = 3.5 m/s²."
+        f"g = 3.5 m/s². Written by keras_pendulum {__version__}."
     )

@@ -121,11 +121,27 @@ function drawTorque(context, colours, rod, torque) {
   }
 }
 
-/** Draws a bar for the Q-value of each torque, from the lowest to the highest, and marks `taken`. */
-function drawBars(canvas, colours, torques, qValues, best, taken) {
+/**
+ * Returns round limits of an axis for `values`. The limits `before` stay as long as the values are
+ * within them and fill a fifth of them, so that the axis does not move with every step.
+ */
+function steadyLimits(values, before) {
+  const [lowest, highest] = [Math.min(...values), Math.max(...values)];
+  const span = Math.max(highest - lowest, 1e-3);
+  if (before && lowest >= before[0] && highest <= before[1] && 5 * span >= before[1] - before[0]) {
+    return before;
+  }
+  const power = 10 ** Math.floor(Math.log10(span / 2));
+  const unit = power * [5, 2, 1].find((factor) => factor * power <= span / 2);
+  const low = Math.floor(lowest / unit) * unit;
+  return [low, Math.max(Math.ceil(highest / unit) * unit, low + unit)];
+}
+
+/** Draws a bar for the Q-value of each torque between the `limits`, and marks `taken`. */
+function drawBars(canvas, colours, torques, qValues, limits, best, taken) {
   const { context, width, height } = blank(canvas);
-  const [left, right, top, bottom] = [62, width - 6, 12, height - 38];
-  const [lowest, highest] = [Math.min(...qValues), Math.max(...qValues)];
+  const [left, right, top, bottom] = [76, width - 6, 12, height - 38];
+  const [lowest, highest] = limits;
   const pitch = (right - left) / torques.length;
   const middle = (i) => left + (i + 0.5) * pitch;
   const floor = bottom - 4; // the lowest bar stays visible
@@ -135,11 +151,18 @@ function drawBars(canvas, colours, torques, qValues, best, taken) {
   line(context, [[left, top], [right, top]]);
   line(context, [[left, bottom], [right, bottom]]);
   context.fillStyle = colours.soft;
-  write(context, shown(highest, 3), left - 6, top, "right");
-  write(context, shown(lowest, 3), left - 6, floor, "right");
+  const digits = clipped(Math.max(1 - Math.floor(Math.log10(highest - lowest)), 0), 4);
+  for (const [value, y] of [[highest, top], [lowest, floor]]) {
+    write(context, shown(value, digits), left - 6, y, "right");
+  }
+  context.save();
+  context.translate(12, (top + bottom) / 2);
+  context.rotate(-Math.PI / 2);
+  write(context, "Q (return)", 0, 0);
+  context.restore();
 
   qValues.forEach((value, i) => {
-    const share = highest > lowest ? (value - lowest) / (highest - lowest) : 0;
+    const share = (value - lowest) / (highest - lowest);
     const y = floor - share * (floor - top);
     const [x, wide] = [middle(i) - pitch * 0.41, pitch * 0.82];
     context.fillStyle = i === best ? colours.ink : `rgb(${colours.ofTorque(torques[i])})`;

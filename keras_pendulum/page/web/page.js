@@ -5,19 +5,24 @@ const element = (id) => document.getElementById(id);
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const TRAIL = 12; // steps
 
-/** Returns the text below the title. */
-function about({ name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn }) {
+/** Returns the text on the network. */
+function about(recorded) {
+  const { name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn } = recorded;
+  const { version } = recorded;
   const from = preset && !name.startsWith(`${preset}.`) ? ` (preset ${preset})` : "";
   const sentences = [
     `${name}${from}, a ${sizes.slice(1, -1).join("-")} ${activation} network with ` +
       `${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
   ];
   const elsewhere = trainedGravity !== null && trainedGravity !== gravity;
-  if (elsewhere) sentences.push(`It was trained at g = ${trainedGravity} m/s².`);
+  if (elsewhere) {
+    sentences.push(`Another gravity than in training: it was trained at g = ${trainedGravity} m/s².`);
+  }
   if (evaluatedReturn !== null) {
     const where = elsewhere ? " there" : "";
     sentences.push(`Mean return when evaluated${where}: ${shown(evaluatedReturn, 2)}.`);
   }
+  sentences.push(`Written by keras_pendulum ${version}.`);
   return sentences.join(" ");
 }
 
@@ -131,9 +136,13 @@ class Page {
       element("last-return").textContent = shown(episode.last.return, 1);
       element("last-driver").textContent = `by ${episode.last.driver}`;
     }
-    const { qValues, best, youDrive, yourTorque } = episode;
-    element("best").textContent = `${shown(torques[best], this.digits, true)} N·m`;
-    drawBars(element("bars"), colours, torques, qValues, best, youDrive ? yourTorque : torques[best]);
+    const { best, youDrive, yourTorque } = episode;
+    const values = Array.from(episode.qValues, (value) => value / recorded.rewardScale);
+    this.limits = steadyLimits(values, this.limits);
+    const greedy = `${shown(torques[best], this.digits, true)} N·m`;
+    element("best").textContent = `${greedy}: ${shown(values[best], 2)}`;
+    const taken = youDrive ? yourTorque : torques[best];
+    drawBars(element("bars"), colours, torques, values, this.limits, best, taken);
     this.picture ??= mapPicture(this.map, colours);
     drawPortrait(element("portrait"), colours, this.picture, episode.path);
   }
