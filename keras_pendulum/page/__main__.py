@@ -29,6 +29,9 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     weights = parser.add_argument(
         "weights", metavar="WEIGHTS.h5", help="a file, or the name of a shipped one"
     )
+    against = parser.add_argument(
+        "--against", metavar="WEIGHTS.h5", help="a second network, shown beside the first"
+    )
     parser.add_argument(
         "--out",
         type=nonempty_path,
@@ -42,6 +45,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     add_activation_flag(parser)
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
     complete_with(weights, weights_files(shipped_names))
+    complete_with(against, weights_files(shipped_names))
     arguments = parser.parse_args(argv)
     return run_command(lambda: _write(arguments))
 
@@ -59,7 +63,11 @@ def _write(arguments: argparse.Namespace) -> int:
         from keras_pendulum.storage.weights import load_weights
 
     path = find_weights(arguments.weights)
-    page = build_page(load_weights(path, arguments.activation), path, arguments.gravity)
+    network, against = load_weights(path, arguments.activation), None
+    if arguments.against is not None:
+        other = find_weights(arguments.against)
+        against = (load_weights(other), other)
+    page = build_page(network, path, arguments.gravity, against)
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")

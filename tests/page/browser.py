@@ -78,8 +78,9 @@ class Player:
         return state
 
     def focus(self) -> str:
-        """Returns the id of the element that has the focus, or its torque."""
-        return str(self.run("const e = document.activeElement; return e.id || e.dataset.torque"))
+        """Returns the id of the element that has the focus, or its torque or layer."""
+        script = "const e = document.activeElement;"
+        return str(self.run(f"{script} return e.id || e.dataset.torque || e.dataset.layer"))
 
     def log(self, kind: str) -> list[dict[str, Any]]:
         """Returns the entries of a browser log since the last call."""

@@ -17,13 +17,15 @@ from browser import Player, find_chromium, start
 from numpy.typing import NDArray
 from selenium import webdriver
 from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.actions.pointer_input import PointerInput
 from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
 from keras_pendulum.dqn.network import Provenance
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import TorqueGrid
-from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.environments.tasks import make_environment, pendulum_starts
 from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.version import __version__
 
@@ -239,9 +241,7 @@ def test_new_random_start_follows_the_last_step(pages: dict[str, str], player: P
     player.press("t", "s")
     player.wait(lambda: player.text("step") == "200/200")
     total = player.state()["return"]
-    shown = f"{total:.1f}".replace("-", "−")
-    player.wait(lambda: player.text("last-return") == shown)
-    assert player.text("last-driver") == "by both"
+    assert player.text("score").startswith(f"Score: you and network {shown(total)} · network −")
     starts = []
     for _ in range(20):
         player.run("pendulum.reset(); for (let i = 0; i < 200; i++) pendulum.step()")
@@ -254,20 +254,24 @@ def test_new_random_start_follows_the_last_step(pages: dict[str, str], player: P
     assert -1 <= min(speeds) < -0.3 < 0.3 < max(speeds) <= 1
 
 
+def shown(total: float) -> str:
+    return f"{total:.1f}".replace("-", "−")
+
+
 def test_tab_focuses_every_control_in_order_with_an_outline(
     pages: dict[str, str], player: Player
 ) -> None:
     player.open(pages["small"])
     order = []
-    for _ in range(7):
+    for _ in range(9):
         player.press(Keys.TAB)
         order.append(player.focus())
         outline = "getComputedStyle(document.activeElement).outline"
         assert "solid 3px" in player.run(f"return {outline}")
-    assert order == ["take-over", "-2", "0", "2", "pause", "one-step", "restart"]
+    assert order == ["take-over", "-2", "0", "2", "pause", "one-step", "restart", "0", "2"]
     player.press(Keys.SPACE)  # the button's own key, not the pause
     assert player.text("status") == "The network drives."
-    assert player.focus() == "restart"
+    assert player.run("return pendulum.page.layer") == 2
     player.find("take-over").send_keys(Keys.ENTER)
     assert player.text("status") == "You drive."
     player.button(2).send_keys(Keys.SPACE)
@@ -300,7 +304,7 @@ def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player:
     player.run("pendulum.reset(3, -8); pendulum.page.episode.return = -1234.56")
     player.run("for (let i = 0; i < 200; i++) pendulum.step()")  # a last episode of four digits
     player.press("t")
-    player.wait(lambda: player.text("last-driver") == "by network")
+    player.wait(lambda: player.text("score").startswith("Score: network −"))
     for width, height in ((320, 568), (360, 740), (390, 844), (600, 900), (844, 390), (960, 600)):
         player.set_screen(width, height, **colour)
         overhang = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
@@ -314,17 +318,21 @@ def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player:
         )
         assert cut == [], width
         low = player.run(
-            "return Math.min(...[...document.querySelectorAll('button')].map(e => e.clientHeight))"
+            "return Math.min(...[...document.querySelectorAll('button')]"
+            ".filter(e => e.offsetParent).map(e => e.clientHeight))"
         )
         assert low >= 42  # px, plus the border: large enough for a finger
         canvases = player.run(
-            "return [...document.querySelectorAll('canvas')]"
+            "return [...document.querySelectorAll('canvas')].filter(c => c.offsetParent)"
             ".map(c => Math.min(c.clientWidth, c.clientHeight))"
         )
         assert min(canvases) >= 150
     player.set_screen(360, 740, **colour)
-    widths = "return [...document.querySelectorAll('canvas')].map(c => c.width / c.clientWidth)"
-    player.wait(lambda: player.run(widths) == [2, 2, 2])  # as sharp as the screen
+    widths = (
+        "return [...document.querySelectorAll('canvas')].filter(c => c.offsetParent)"
+        ".map(c => c.width / c.clientWidth)"
+    )
+    player.wait(lambda: set(player.run(widths)) == {2})  # as sharp as the screen
     dark = player.run("return getComputedStyle(document.body).backgroundColor") == "rgb(15, 19, 25)"
     assert dark == (theme == "dark")
 
@@ -407,6 +415,144 @@ def test_arrow_of_a_positive_torque_turns_counter_clockwise(
     # The arrow is below the pivot: its wide head is on the right if it turns counter-clockwise.
     columns = np.nonzero(arrow)[1] - arrow.shape[1] / 2
     assert side * columns.mean() > 1
+
+
+@pytest.fixture(scope="module")
+def duel(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The address of a page with two networks."""
+    out = tmp_path_factory.mktemp("duel") / "page.html"
+    command = ["reference", "--against", "original", "--out", str(out)]
+    assert page_command.main(command) == 0
+    assert out.stat().st_size < 2_500_000
+    return out.as_uri()
+
+
+def test_two_networks_run_in_step_from_one_start(duel: str, player: Player) -> None:
+    player.open(duel)
+    player.press(Keys.SPACE)
+    assert [player.text(f"name-{i}") for i in (0, 1)] == ["reference", "original"]
+    env = make_environment("Pendulum-v1", 1.0)
+    env.reset(seed=3)
+    pendulum: Any = env.unwrapped
+    start = pendulum.state.tolist()
+    player.run("pendulum.reset(arguments[0], arguments[1])", *start)
+    player.run("for (let i = 0; i < 200; i++) pendulum.step()")
+    totals = []
+    for name in ("reference", "original"):
+        score = kp.evaluate_policy(
+            kp.load_weights(kp.find_weights(name)), episodes=1, seed=3, gravity=1.0
+        )
+        totals.append(score.mean_return)
+    best = score.optimal_returns[0]
+    found = player.run("return pendulum.page.episodes.map(e => e.return)")
+    np.testing.assert_allclose(found, totals, atol=0.02)
+    assert player.text("score") == (
+        f"Score: reference {shown(found[0])} · original {shown(found[1])} · "
+        f"optimum {player.text('optimum')}"
+    )
+    optimum = player.run("return pendulum.page.optimalReturn")
+    assert optimum == pytest.approx(best, abs=0.02)
+    wide = player.run("return [0, 1].map(i => document.getElementById(`name-${i}`).offsetParent)")
+    assert None not in wide
+
+
+@pytest.mark.parametrize(("name", "gravity"), [("reference", 1.0), ("swingup", 10.0)])
+def test_optimum_of_a_start_is_the_exact_one(
+    name: str, gravity: float, pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages[name])
+    player.press(Keys.SPACE)
+    starts = pendulum_starts(range(20)).tolist()
+    found = player.run(
+        "return arguments[0].map(s => pendulum.page.optimum.returnFrom(s[0], s[1]))", starts
+    )
+    shortfall = kp.optimal_return(gravity, range(20)) - found
+    assert shortfall.min() > -0.01  # a simulated return cannot be above the optimum
+    assert np.median(shortfall) < 0.05
+    assert shortfall.max() < (0.02 if gravity == 1 else 4)
+
+
+def test_map_switches_to_the_optimum(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["reference"])
+    player.press(Keys.SPACE, "m")
+    player.wait(lambda: player.run("return pendulum.page.layer === 2 && pendulum.page.map.ready"))
+    size = player.run("return pendulum.page.map.size")
+    found = np.array(player.run("return Array.from(pendulum.page.map.torques)"))
+    found = found.reshape(size, size)
+    inner = found[1:-1, 1:-1]
+    np.testing.assert_allclose(inner, -inner[::-1, ::-1], atol=0.21)  # the mirrored states
+    assert abs(found[size // 2, size // 2]) < 0.11
+    player.press("m")
+    assert player.run("return pendulum.page.layer") == 0
+
+
+SCREENS = [(1280, 657), (390, 844), (844, 390)]
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_dragging_turns_the_pendulum_and_starts_an_episode_there(
+    width: int, height: int, pages: dict[str, str], player: Player
+) -> None:
+    player.set_screen(width, height)
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(3, 0); pendulum.step()")
+    player.run("document.getElementById('pendulum').scrollIntoView({block: 'center'})")
+    canvas = player.find("pendulum")
+    drag = ActionChains(player.driver, duration=0)
+    drag.move_to_element_with_offset(canvas, 0, -60).click_and_hold().perform()
+    assert player.state()["theta"] == pytest.approx(0, abs=0.05)
+    assert player.run("return pendulum.page.held")
+    drag = ActionChains(player.driver, duration=0)
+    drag.move_to_element_with_offset(canvas, -60, 0).pause(0.3).release().perform()
+    state = player.state()
+    assert state["theta"] == pytest.approx(np.pi / 2, abs=0.05)  # on the left is positive
+    assert (state["thetadot"], state["steps"], state["return"]) == (0, 0, 0)
+    player.wait(lambda: player.text("optimum").startswith("−"))
+    player.press("s")
+    assert player.state()["steps"] == 1
+
+
+def test_a_flick_pushes_the_pendulum(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    canvas = player.find("pendulum")
+    flick = ActionChains(player.driver, duration=30)
+    flick.move_to_element_with_offset(canvas, 0, -60).click_and_hold()
+    flick.move_to_element_with_offset(canvas, -20, -57).release().perform()
+    assert 0 < player.state()["thetadot"] <= 8
+    speed = (
+        "const t = new Touch(() => {}); t.moves = arguments[0]; return t.flickSpeed(arguments[1])"
+    )
+    assert player.run(speed, [[1, 0], [1.05, 0.1]], 1.06) == pytest.approx(2)
+    assert player.run(speed, [[1, 0], [1.05, -1]], 1.06) == -8  # the speed limit
+    assert player.run(speed, [[1, 0], [1.05, 0.1]], 2) == 0  # held still before the release
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+@pytest.mark.parametrize("finger", ["mouse", "touch"])
+def test_a_press_on_the_portrait_chooses_the_state(
+    finger: str, width: int, height: int, duel: str, player: Player
+) -> None:
+    player.set_screen(width, height)
+    player.open(duel)
+    player.press(Keys.SPACE)
+    place = player.run(
+        "const c = document.getElementById('portrait'); c.scrollIntoView({block: 'center'});"
+        "const r = c.getBoundingClientRect();"
+        "const [left, right, top, bottom] = portraitEdges(r.width, r.height);"
+        "return [r.left + left + 0.75 * (right - left), r.top + top + 0.25 * (bottom - top)]"
+    )
+    pointer = PointerInput(finger, finger)  # type: ignore[no-untyped-call]
+    press = ActionBuilder(player.driver, mouse=pointer, duration=0)
+    action: Any = press.pointer_action
+    action.move_to_location(*map(round, place)).pointer_down().pointer_up()
+    press.perform()
+    found = player.run("return pendulum.page.episodes.map(e => [e.theta, e.thetadot])")
+    np.testing.assert_allclose(found[0], [np.pi / 2, 4], atol=0.1)
+    assert found[0] == found[1]
+    player.press("h")
+    assert player.run("return pendulum.page.episodes.map(e => e.theta)") == [np.pi, np.pi]
 
 
 def test_map_shows_the_greedy_torque_of_every_state(

@@ -53,6 +53,8 @@ WRONG = [
     (["text.h5"], "text.h5: not an HDF5 file"),
     (["n" * 300], "File name too long"),
     (["cartpole"], "belongs to CartPole-v1; the page shows Pendulum-v1"),
+    ([RECORDED, "--against", "cartpole"], "belongs to CartPole-v1; the page shows Pendulum-v1"),
+    ([RECORDED, "--against", "missing.h5"], "missing.h5: no such file"),
     ([RECORDED, "--gravity", "nan"], "gravity is nan"),
     ([RECORDED, "--gravity", "heavy"], "invalid float value: 'heavy'"),
     ([RECORDED, "--out", ""], "the name is empty"),

@@ -203,10 +203,15 @@ function mapPicture(map, colours) {
   return picture;
 }
 
-/** Draws the phase plane: the map, and the path of [θ, θ̇] over it. */
-function drawPortrait(canvas, colours, picture, path) {
+/** Returns the edges of the map in a canvas: left, right, top, bottom. */
+function portraitEdges(width, height) {
+  return [46, width - 10, 8, height - 40];
+}
+
+/** Draws the phase plane: the map, and the paths of [θ, θ̇] over it, the second one dashed. */
+function drawPortrait(canvas, colours, picture, paths) {
   const { context, width, height } = blank(canvas);
-  const [left, right, top, bottom] = [46, width - 10, 8, height - 40];
+  const [left, right, top, bottom] = portraitEdges(width, height);
   const x = (theta) => left + ((theta / Math.PI + 1) / 2) * (right - left);
   const y = (thetadot) => top + ((1 - thetadot / MAX_SPEED) / 2) * (bottom - top);
 
@@ -224,24 +229,30 @@ function drawPortrait(canvas, colours, picture, path) {
     right - left + cellX,
     bottom - top + cellY,
   );
-  for (const [colour, thickness] of [[colours.halo, 4.5], [colours.path, 2]]) {
-    context.strokeStyle = colour;
-    context.lineWidth = thickness;
-    continuous(path).forEach((part) => line(context, part.map(([a, b]) => [x(a), y(b)])));
-  }
+  paths.forEach((path, i) => {
+    for (const [colour, thickness] of [[colours.halo, 4.5], [colours.path, 2]]) {
+      context.strokeStyle = colour;
+      context.lineWidth = thickness;
+      context.setLineDash(i && colour === colours.path ? [5, 5] : []);
+      continuous(path).forEach((part) => line(context, part.map(([a, b]) => [x(a), y(b)])));
+    }
+  });
   context.restore();
   context.strokeStyle = colours.soft;
   context.lineWidth = 1;
   context.strokeRect(left, top, right - left, bottom - top);
 
-  const [theta, thetadot] = path.at(-1);
-  context.fillStyle = colours.path;
-  context.strokeStyle = colours.halo;
-  context.lineWidth = 2.5;
-  context.beginPath();
-  context.arc(x(wrapped(theta)), y(thetadot), 6.5, 0, 2 * Math.PI);
-  context.fill();
-  context.stroke();
+  // The second network's circle is hollow, and below the first one's.
+  for (const [i, path] of [...paths.entries()].reverse()) {
+    const [theta, thetadot] = path.at(-1);
+    [context.fillStyle, context.strokeStyle] = [colours.path, colours.halo];
+    if (i) [context.fillStyle, context.strokeStyle] = [colours.halo, colours.path];
+    context.lineWidth = 2.5;
+    context.beginPath();
+    context.arc(x(wrapped(theta)), y(thetadot), i ? 8 : 6.5, 0, 2 * Math.PI);
+    context.fill();
+    context.stroke();
+  }
 
   context.fillStyle = colours.soft;
   ["−π", "−π/2", "0", "π/2", "π"].forEach((text, i) => {

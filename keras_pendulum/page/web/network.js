@@ -63,6 +63,11 @@ class Network {
     }
     return features;
   }
+
+  /** Returns the greedy torque in N·m. */
+  torque(theta, thetadot) {
+    return this.torques[argmax(this.qValues(observed(theta, thetadot)))];
+  }
 }
 
 /** Returns the index of the highest value, the lowest index among equal ones. */

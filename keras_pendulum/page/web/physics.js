@@ -26,6 +26,24 @@ function observed(theta, thetadot) {
   return Float32Array.of(Math.cos(theta), Math.sin(theta), thetadot);
 }
 
+/** Returns θ, θ̇ and the reward of one time step of 0.05 s. */
+function advanced(gravity, theta, thetadot, torque) {
+  const cost = wrapped(theta) ** 2 + 0.1 * thetadot ** 2 + 0.001 * torque ** 2;
+  const acceleration = ((3 * gravity) / 2) * Math.sin(theta) + 3 * torque;
+  const speed = clipped(thetadot + acceleration * TIME_STEP, MAX_SPEED);
+  return [theta + speed * TIME_STEP, speed, -cost];
+}
+
+/** Returns the sum of the rewards of a policy, which returns a torque for θ and θ̇. */
+function simulatedReturn(gravity, theta, thetadot, steps, policy) {
+  let [total, reward] = [0, 0];
+  for (let step = 0; step < steps; step++) {
+    [theta, thetadot, reward] = advanced(gravity, theta, thetadot, policy(theta, thetadot));
+    total += reward;
+  }
+  return total;
+}
+
 /** A series of episodes, driven by the network or by the user. */
 class Episode {
   constructor(network, gravity) {
@@ -33,7 +51,6 @@ class Episode {
     this.gravity = gravity; // m/s²
     this.youDrive = false;
     this.yourTorque = 0; // N·m, acts until the user chooses another
-    this.last = null; // {return, driver} of the last finished episode
     this.reset();
   }
 
@@ -56,21 +73,14 @@ class Episode {
 
   /** Takes one time step of 0.05 s with the torque of the driver. */
   step() {
-    const { theta, thetadot } = this;
     const torque = this.youDrive ? this.yourTorque : this.network.torques[this.best];
-    const cost = wrapped(theta) ** 2 + 0.1 * thetadot ** 2 + 0.001 * torque ** 2;
-    const acceleration = ((3 * this.gravity) / 2) * Math.sin(theta) + 3 * torque;
-    this.thetadot = clipped(thetadot + acceleration * TIME_STEP, MAX_SPEED);
-    this.theta = theta + this.thetadot * TIME_STEP;
+    const next = advanced(this.gravity, this.theta, this.thetadot, torque);
+    [this.theta, this.thetadot, this.reward] = next;
     this.torque = torque;
-    this.reward = -cost;
-    this.return -= cost;
+    this.return += this.reward;
     this.steps += 1;
     this.path.push([this.theta, this.thetadot]);
     this.drivers.add(this.youDrive ? "you" : "network");
-    if (this.steps === EPISODE_STEPS) {
-      this.last = { return: this.return, driver: this.drivers.size > 1 ? "both" : [...this.drivers][0] };
-    }
     this.#observe();
   }
 
@@ -80,10 +90,10 @@ class Episode {
   }
 }
 
-/** The greedy torque over the phase plane, computed in small portions, coarse cells first. */
+/** The torque of a policy over the phase plane, computed in small portions, coarse cells first. */
 class TorqueMap {
-  constructor(network, size = 97) {
-    this.network = network;
+  constructor(policy, size = 97) {
+    this.policy = policy; // returns a torque in N·m for θ and θ̇
     this.size = size; // θ from -π to π by columns, θ̇ from 8 to -8 by rows, ends included
     this.torques = new Float32Array(size * size);
     this.ready = false;
@@ -111,17 +121,13 @@ class TorqueMap {
         break;
       }
       const [row, column, width] = value;
-      const torque = this.greedyTorque(this.theta(column), this.thetadot(row));
+      const torque = this.policy(this.theta(column), this.thetadot(row));
       for (let i = row; i < Math.min(row + width, this.size); i++) {
         const j = i * this.size + column;
         this.torques.fill(torque, j, Math.min(j + width, (i + 1) * this.size));
       }
     } while (performance.now() < end);
     return true;
-  }
-
-  greedyTorque(theta, thetadot) {
-    return this.network.torques[argmax(this.network.qValues(observed(theta, thetadot)))];
   }
 
   *#coarseToFine() {
