@@ -268,7 +268,7 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
         order.append(player.focus())
         outline = "getComputedStyle(document.activeElement).outline"
         assert "solid 3px" in player.run(f"return {outline}")
-    assert order == ["take-over", "-2", "0", "2", "pause", "one-step", "restart", "0", "2"]
+    assert order == ["take-over", "pause", "one-step", "restart", "-2", "0", "2", "0", "2"]
     player.press(Keys.SPACE)  # the button's own key, not the pause
     assert player.text("status") == "The network drives."
     assert player.run("return pendulum.page.layer") == 2
@@ -326,7 +326,7 @@ def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player:
             "return [...document.querySelectorAll('canvas')].filter(c => c.offsetParent)"
             ".map(c => Math.min(c.clientWidth, c.clientHeight))"
         )
-        assert min(canvases) >= 150
+        assert min(canvases) >= 120
     player.set_screen(360, 740, **colour)
     widths = (
         "return [...document.querySelectorAll('canvas')].filter(c => c.offsetParent)"
@@ -335,6 +335,43 @@ def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player:
     player.wait(lambda: set(player.run(widths)) == {2})  # as sharp as the screen
     dark = player.run("return getComputedStyle(document.body).backgroundColor") == "rgb(15, 19, 25)"
     assert dark == (theme == "dark")
+
+
+@pytest.mark.parametrize("page", ["one", "two"])
+@pytest.mark.parametrize(
+    ("width", "height", "visible"),
+    [
+        (1280, 657, ("#swing", "#values", "#phase", ".legend", "#about")),
+        (390, 844, ("#pair", "#score", "#phase", ".legend", "#take-over")),
+        (844, 390, ("#swing", "#pair", "#readings", "#score", ".torques")),
+    ],
+)
+def test_first_screen_shows_what_belongs_together(
+    page: str,
+    width: int,
+    height: int,
+    visible: tuple[str, ...],
+    pages: dict[str, str],
+    duel: str,
+    player: Player,
+) -> None:
+    player.set_screen(width, height)
+    player.open(duel if page == "two" else pages["reference"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(2, 0); for (let i = 0; i < 200; i++) pendulum.step()")
+    for selector in visible:
+        top, bottom, wide = player.run(
+            "const e = [...document.querySelectorAll(arguments[0])]"
+            ".flatMap(e => e.getClientRects().length ? [e] : [...e.children])"
+            ".map(e => e.getBoundingClientRect());"
+            "return [Math.min(...e.map(r => r.top)), Math.max(...e.map(r => r.bottom)),"
+            "  Math.max(...e.map(r => r.width))]",
+            selector,
+        )
+        assert top >= 0 and bottom <= height and wide > 0, selector
+    end = player.run("return document.documentElement.scrollHeight")
+    if width == 1280:
+        assert end <= height  # nothing to scroll to
 
 
 def test_light_and_dark_theme_have_enough_contrast() -> None:
@@ -431,6 +468,10 @@ def test_two_networks_run_in_step_from_one_start(duel: str, player: Player) -> N
     player.open(duel)
     player.press(Keys.SPACE)
     assert [player.text(f"name-{i}") for i in (0, 1)] == ["reference", "original"]
+    assert player.text("status") == "Paused. Both networks drive."
+    player.press("t")
+    assert [player.text(f"name-{i}") for i in (0, 1)] == ["you", "original"]
+    player.press("t")
     env = make_environment("Pendulum-v1", 1.0)
     env.reset(seed=3)
     pendulum: Any = env.unwrapped

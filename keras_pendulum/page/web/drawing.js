@@ -53,7 +53,8 @@ function write(context, text, x, y, align = "center", baseline = "middle") {
  */
 function drawPendulum(canvas, colours, theta, torque, trail) {
   const { context, width, height } = blank(canvas);
-  const rod = Math.min(width / 2 - 52, height / 2 - 28);
+  const narrow = width < 230; // no room for the labels at the sides
+  const rod = Math.min(width / 2 - (narrow ? 14 : 52), height / 2 - 28);
   context.translate(width / 2, height / 2);
   const at = (angle, radius) => [-Math.sin(angle) * radius, -Math.cos(angle) * radius];
 
@@ -69,8 +70,10 @@ function drawPendulum(canvas, colours, theta, torque, trail) {
   context.fillStyle = colours.soft;
   write(context, "0", 0, -rod - 18);
   write(context, "±π", 0, rod + 20);
-  write(context, "π/2", -rod - 18, 0, "right");
-  write(context, "−π/2", rod + 18, 0, "left");
+  if (!narrow) {
+    write(context, "π/2", -rod - 18, 0, "right");
+    write(context, "−π/2", rod + 18, 0, "left");
+  }
 
   context.strokeStyle = colours.rod;
   context.lineWidth = rod * 0.05;

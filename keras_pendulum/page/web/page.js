@@ -128,7 +128,7 @@ class Page {
     element("other").hidden = false;
     document.querySelector("figcaption").hidden = false;
     names.forEach((name, i) => {
-      element(`name-${i}`).textContent = name;
+      if (i) element(`name-${i}`).textContent = name;
       const button = document.querySelector(`[data-layer="${i}"]`);
       button.hidden = false;
       button.textContent = name;
@@ -183,7 +183,9 @@ class Page {
       button.setAttribute("aria-pressed", pressed);
     }
     element("pause").firstElementChild.textContent = this.running ? "Pause" : "Play";
-    const driver = youDrive ? "You drive." : "The network drives.";
+    const network = this.other ? "Both networks drive." : "The network drives.";
+    const driver = youDrive ? "You drive." : network;
+    element("name-0").textContent = youDrive ? "you" : this.names[0];
     element("status").textContent = this.running ? driver : `Paused. ${driver}`;
   }
 
