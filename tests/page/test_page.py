@@ -254,6 +254,32 @@ def test_new_random_start_follows_the_last_step(pages: dict[str, str], player: P
     assert -1 <= min(speeds) < -0.3 < 0.3 < max(speeds) <= 1
 
 
+def test_score_stays_while_time_runs_on(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(1, 0); for (let i = 0; i < 198; i++) pendulum.step()")
+    assert player.text("score") == "The score comes after 200 steps."
+    player.press(Keys.SPACE)
+    player.wait(lambda: player.state()["over"])
+    score = player.text("score")
+    assert score.startswith("Score: network −")
+    player.wait(lambda: player.state()["steps"] == 1)  # the next episode, after a rest
+    assert player.text("score") == score
+
+
+def test_score_has_the_network_from_your_start(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    episode = "pendulum.reset(1, 0); for (let i = 0; i < 200; i++) pendulum.step()"
+    player.run(episode)
+    network = player.state()["return"]
+    player.press("l")
+    player.run(episode)
+    you = player.state()["return"]
+    assert you < network
+    assert player.text("score").startswith(f"Score: you {shown(you)} · network {shown(network)} · ")
+
+
 def shown(total: float) -> str:
     return f"{total:.1f}".replace("-", "−")
 
