@@ -19,7 +19,7 @@ from test_floor_plan import imported_modules
 import keras_pendulum as kp
 from benchmarks.choosing import ARMS
 from benchmarks.departures import BEFORE, departures, measured
-from benchmarks.report import RESULTS
+from benchmarks.report import RESULTS, markdown
 
 PACKAGE = Path(kp.__file__).parent
 
@@ -144,6 +144,12 @@ def test_choosing_table_has_the_measured_regrets() -> None:
     assert [row["training"] for row in rows] == [arm.partition(":")[0] for arm in ARMS]
     shown = README.split("choosing.json -->")[1].split("\n\n")[0].strip().splitlines()[2:]
     assert shown == [f"| {row['training']} | {summary(row['regrets'])} |" for row in rows]
+
+
+def test_last_regret_page_has_the_measured_table() -> None:
+    page = (ROOT / "docs" / "last_regret.md").read_text(encoding="utf-8")
+    shown = page.split("benchmarks.last_regret reference -->\n")[1].split("<!--")[0]
+    assert shown == markdown(rows_of("last_regret_reference"))
 
 
 def test_study_table_is_the_measured_one() -> None:
