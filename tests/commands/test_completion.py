@@ -67,7 +67,7 @@ SCRIPT = "import sys; from keras_pendulum.__main__ import main; sys.exit(main())
         (f"{MODULE}.train --preset ", set(PRESETS)),
         (f"{MODULE}.train --preset=s", {"--preset=swingup"}),
         (f"{MODULE}.train --loss ", {"squared", "huber"}),
-        (f"{MODULE}.train --double-q ", {"true", "false"}),
+        (f"{MODULE}.train --double-q t", {"true"}),
         (f"{MODULE}.train --init ", {*SHIPPED, "mine.h5", "model.keras", "runs/"}),
         (f"{MODULE}.train --out r", {"runs/"}),
         (f"{MODULE}.evaluate --gi", {"--gif"}),

@@ -107,9 +107,9 @@ def test_declared_dependencies_are_the_imported_ones() -> None:
         for path in ROOT.glob("keras_pendulum/**/*.py")
         for module in imported_modules(path)
     }
-    # IPython is imported only in a notebook. Study and shell completion check for their extras.
+    # IPython is imported only in a notebook. The users of an extra check for it.
     imported -= {"keras_pendulum", "IPython", *sys.stdlib_module_names}
-    imported -= {"argcomplete", "scipy", "distributed", "dask"}
+    imported -= {"argcomplete", "tensorboard", "scipy", "distributed", "dask"}
     config = configparser.ConfigParser()
     config.read(ROOT / "setup.cfg", encoding="utf-8")
     declared = set(re.findall(r"^[\w-]+", config["options"]["install_requires"], re.MULTILINE))
