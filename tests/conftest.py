@@ -38,9 +38,10 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Marks the quick tests."""
+    """Marks the quick tests. A test of a command is none: its process imports TensorFlow."""
     for item in items:
-        if item.path.parent.name in QUICK_ROOMS and not item.get_closest_marker("slow"):
+        is_slow = item.get_closest_marker("slow") or "command" in getattr(item, "fixturenames", ())
+        if item.path.parent.name in QUICK_ROOMS and not is_slow:
             item.add_marker("quick")
 
 
