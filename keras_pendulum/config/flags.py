@@ -8,9 +8,10 @@ from typing import Any
 
 from keras_pendulum.cli import OneLineParser
 from keras_pendulum.completion import complete_with, names
-from keras_pendulum.config.config import RENAMED, Config, parse_setting
+from keras_pendulum.config.config import Config
 from keras_pendulum.config.fields import Switch, Text, format_value, kind_of
 from keras_pendulum.config.presets import PRESETS
+from keras_pendulum.config.settings import RENAMED, parse_setting
 from keras_pendulum.errors import ConfigError
 
 # The settings that people change first. `--help` shows these, `--help-all` shows all.

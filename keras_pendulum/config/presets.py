@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from keras_pendulum.config.config import Config, require_known
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.settings import require_known
 from keras_pendulum.errors import ConfigError, did_you_mean
 
 _REFERENCE = Config()

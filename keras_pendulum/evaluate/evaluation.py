@@ -14,7 +14,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.config.config import Config, validate_setting
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.settings import validate_setting
 from keras_pendulum.dqn.network import DQN, Provenance
 from keras_pendulum.environments.actions import make_actions
 from keras_pendulum.environments.tasks import TASKS, make_environment, pendulum_starts

@@ -18,7 +18,8 @@ from keras_pendulum.cli import (
     run_command,
 )
 from keras_pendulum.completion import complete_with, weights_files
-from keras_pendulum.config.config import Config, validate_setting
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.settings import validate_setting
 from keras_pendulum.display import require_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError

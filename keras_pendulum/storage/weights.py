@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.config.config import validate_setting
+from keras_pendulum.config.settings import validate_setting
 from keras_pendulum.dqn.network import DQN, REGISTERED_NAME, Provenance
 from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.tasks import TASKS

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from keras_pendulum.config.config import Config, parse_setting
+from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import preset
+from keras_pendulum.config.settings import parse_setting
 from keras_pendulum.environments.tasks import task_name
 from keras_pendulum.errors import ConfigError
 

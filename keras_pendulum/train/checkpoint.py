@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.config.config import RENAMED, Config
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.settings import RENAMED
 from keras_pendulum.dqn.agent import Variables
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import ConfigError, WeightsError

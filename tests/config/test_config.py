@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.config.config import RENAMED, Config, parse_setting, validate_setting
+from keras_pendulum.config.config import Config
 from keras_pendulum.config.fields import Integer, Number, kind_of
+from keras_pendulum.config.settings import RENAMED, parse_setting, validate_setting
 
 INF, NAN = float("inf"), float("nan")
 # The lowest and the highest value of each number.

@@ -10,10 +10,11 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.cli import OneLineParser
-from keras_pendulum.config.config import RENAMED, Config, parse_setting
+from keras_pendulum.config.config import Config
 from keras_pendulum.config.fields import format_value
 from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS
+from keras_pendulum.config.settings import RENAMED, parse_setting
 
 SETTINGS = [spec.name for spec in fields(Config) if spec.name != "preset"]
 

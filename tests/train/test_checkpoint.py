@@ -16,7 +16,8 @@ import pytest
 from conftest import assert_same
 
 import keras_pendulum as kp
-from keras_pendulum.config.config import RENAMED, Config
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.settings import RENAMED
 from keras_pendulum.train.checkpoint import (
     CheckpointWriter,
     load_checkpoint,

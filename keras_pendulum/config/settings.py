@@ -1,0 +1,51 @@
+"""Single settings by their name: validation, parsing, unknown and old names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.fields import kind_of
+from keras_pendulum.errors import ConfigError, did_you_mean
+
+# Settings of version 0.1 that have another name now.
+RENAMED = {
+    "update_after": "train_frequency (episode or step)",
+    "learning_starts": "warmup_episodes (learning_starts + 1)",
+    "target_blend": "tau",
+    "bootstrap": "double_q (true or false)",
+    "episode_steps": "max_episode_steps",
+    "remembered_action": "stored_index (exact or truncated)",
+}
+
+
+def validate_setting(name: str, value: Any) -> Any:
+    """Returns `value` as the setting `name` stores it: 3 becomes 3.0 for a floating-point setting.
+
+    Raises ConfigError for an unknown or renamed setting, and for a value that it does not accept.
+    """
+    require_known(name)
+    return kind_of(Config.__dataclass_fields__[name]).validate(name, value)
+
+
+def parse_setting(name: str, text: str) -> Any:
+    """Returns the value of `name=text`; the Config checks its range.
+
+    Raises ConfigError for an unknown or renamed setting, and for a text of another kind.
+    """
+    require_known(name)
+    kind = kind_of(Config.__dataclass_fields__[name])
+    try:
+        return kind.parse(text)
+    except ValueError as error:
+        raise ConfigError(f"{name} is {text!r}; expected {kind.expected}") from error
+
+
+def require_known(name: str) -> None:
+    """Raises ConfigError for a name that is no setting; for an old name it says the new one."""
+    if name in RENAMED:
+        raise ConfigError(f"the setting {name} is now {RENAMED[name]}")
+    if name not in Config.__dataclass_fields__:
+        raise ConfigError(
+            f"unknown setting {name}{did_you_mean(name, Config.__dataclass_fields__)}"
+        )
