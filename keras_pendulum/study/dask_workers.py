@@ -117,17 +117,23 @@ def dashboard(client: Client) -> str | None:
 
 @contextmanager
 def _report_lost_scheduler(client: Client, address: str) -> Iterator[None]:
-    """Raises UserError for an error of Dask in the `with` block, if the scheduler is lost."""
-    from distributed.comm.core import CommClosedError
-
+    """Raises UserError for an error in the `with` block, if the scheduler is lost."""
     try:
         yield
     except UserError:
         raise
     except (Exception, CancelledError) as error:
-        if client.status == "running" and not isinstance(error, CommClosedError):
+        if client.status == "running" and _answers(client):
             raise
         raise lost_scheduler(address) from error
+
+
+def _answers(client: Client) -> bool:
+    try:
+        client.run_on_scheduler(int)
+    except (Exception, CancelledError):
+        return False
+    return True
 
 
 def _require_one_thread(client: Client) -> None:
@@ -181,7 +187,8 @@ def _start_cluster() -> LocalCluster:
 
 
 def _close(client: Client) -> None:
-    with _control_c_delayed(), suppress(OSError):
+    # Without its scheduler, the client can end with an error of any type.
+    with _control_c_delayed(), suppress(Exception, CancelledError):
         client.close(timeout=_ANSWER_SECONDS)
 
 

@@ -256,6 +256,26 @@ def test_scheduler_lost_between_two_runs_or_before_the_first_is_one_error(
     assert capfd.readouterr() == ("", "")
 
 
+def test_lost_scheduler_is_reported_by_a_client_that_still_runs_and_fails_at_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*arguments: object, **named: object) -> None:
+        raise RuntimeError
+
+    with running_scheduler(tmp_path) as (_, address), running_worker(address):
+        with (
+            pytest.raises(UserError) as caught,
+            cluster_workers(address, installed_versions()) as client,
+        ):
+            monkeypatch.setattr(client, "close", fail)
+            monkeypatch.setattr(client, "run_on_scheduler", fail)
+            assert client.status == "running"
+            raise OSError("Timed out trying to connect")
+        monkeypatch.undo()
+        client.close()
+    assert str(caught.value) == str(lost_scheduler(address))
+
+
 def test_other_error_is_not_reported_as_a_lost_scheduler(tmp_path: Path) -> None:
     with (
         running_scheduler(tmp_path) as (_, address),
