@@ -44,19 +44,23 @@ def simulate_return(
 
 
 def step_all_torques(
-    gravity: float, theta: NDArray[np.float64], speed: NDArray[np.float64]
+    gravity: float,
+    theta: NDArray[np.float64],
+    speed: NDArray[np.float64],
+    torques: NDArray[np.float64] = TORQUES,
 ) -> tuple[ByTorque, ByTorque, ByTorque]:
-    """Returns the rewards, the next θ and the next θ̇, each [N, 41], of one step.
+    """Returns the rewards, the next θ and the next θ̇, each [N, A], of one step.
 
     Args:
         gravity: g in m/s².
         theta: [N] rad, any angle.
         speed: [N] rad/s, -8 to 8.
+        torques: [A] N·m, -2 to 2.
     """
     # The order of the operations is Gymnasium's, so the floating-point rounding is the same.
     gravity_term = 3 * gravity / 2 * np.sin(theta)  # [N] rad/s²
-    next_speed = speed[:, None] + (gravity_term[:, None] + 3 * TORQUES) * TIME_STEP
+    next_speed = speed[:, None] + (gravity_term[:, None] + 3 * torques) * TIME_STEP
     next_speed = np.clip(next_speed, -MAX_SPEED, MAX_SPEED)
     angle = (theta + np.pi) % (2 * np.pi) - np.pi  # [N], -π to π
-    cost = (angle**2 + 0.1 * speed**2)[:, None] + 0.001 * TORQUES**2
+    cost = (angle**2 + 0.1 * speed**2)[:, None] + 0.001 * torques**2
     return -cost, theta[:, None] + next_speed * TIME_STEP, next_speed

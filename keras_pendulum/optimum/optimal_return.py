@@ -29,7 +29,6 @@ All others are computed at their first use and stored in the user's cache folder
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import logging
 import math
@@ -40,9 +39,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, pendulum_starts
-from keras_pendulum.errors import ConfigError, UserError
+from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum.dynamics import step_all_torques
-from keras_pendulum.optimum.return_cache import cache_file, read, shipped_file, write
+from keras_pendulum.optimum.return_cache import stored_returns
 from keras_pendulum.optimum.value_iteration import (
     FINE_CELLS,
     greedy_return,
@@ -83,27 +82,14 @@ def optimal_return(
         ConfigError: (a ValueError) for a gravity, a seed or steps out of range.
     """
     gravity = validate_gravity(gravity)
-    seeds = [_validate_seed(seed) for seed in seeds]
+    seeds = [validate_seed(seed) for seed in seeds]
     steps = validate_steps(steps)
-    returns = read(shipped_file(gravity, steps), gravity, steps)  # by seed
-    if not returns.keys() >= set(seeds):
-        cache = cache_file(gravity, steps)
-        cached = read(cache, gravity, steps) if cache else {}
-        returns |= cached
-        missing = sorted(set(seeds) - returns.keys())
-        if missing:
-            missing = sorted({*missing, *USUAL_SEEDS} - returns.keys())
-            _log.warning(
-                "Computing the best possible returns for g = %g, once: about 20 s", gravity
-            )
-            best = best_return(gravity, pendulum_starts(missing), steps)
-            computed = dict(zip(missing, best.tolist(), strict=True))
-            returns |= computed
-            with contextlib.suppress(OSError, UserError):  # the cache only saves time
-                if cache:
-                    cache.parent.mkdir(parents=True, exist_ok=True)
-                    write(cache, gravity, steps, cached | computed)
-    return np.array([returns[seed] for seed in seeds], np.float64)
+
+    def compute(missing: list[int]) -> NDArray[np.float64]:
+        _log.warning("Computing the best possible returns for g = %g, once: about 20 s", gravity)
+        return best_return(gravity, pendulum_starts(missing), steps)
+
+    return stored_returns(seeds, compute, USUAL_SEEDS, gravity, steps)
 
 
 def best_return(gravity: float, starts: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
@@ -161,7 +147,8 @@ def validate_gravity(gravity: float) -> float:
     return number + 0.0  # -0.0 becomes 0.0
 
 
-def _validate_seed(seed: int) -> int:
+def validate_seed(seed: int) -> int:
+    """Returns the reset seed as an int. Raises ConfigError unless it is 0 to 2³² - 1."""
     number = operator.index(seed)
     if not 0 <= number <= LARGEST_SEED:
         raise ConfigError(f"seed is {seed}; expected 0 to {LARGEST_SEED}")

@@ -68,3 +68,25 @@ def test_help_is_printed_without_numpy() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("usage: python -m keras_pendulum.optimum")
+
+
+def test_command_writes_the_returns_of_a_discount(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fast_return(gravity: float, discount: float, starts: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(-gravity - discount - np.abs(starts[:, 0]))
+
+    monkeypatch.setattr("keras_pendulum.optimum.discounted.simulate_discounted", fast_return)
+    words = ["1", "--discount", "0.9", "--out", str(tmp_path)]
+    assert optimum_command.main(words) == 0
+    path = tmp_path / "gravity_1_discount_0.9.npz"
+    returns = return_cache.read(path, 1.0, 200, 0.9)
+    assert list(returns) == list(range(1000))
+    assert max(returns.values()) == pytest.approx(-1.9, abs=0.01)
+    assert return_cache.read(path, 1.0, 200, 0.8) == return_cache.read(path, 1.0, 200) == {}
+    assert optimum_command.main(["1", "--discount", "1.5", "--out", str(tmp_path)]) == 2
+    assert optimum_command.main([*words, "--steps", "60"]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "error: discount is 1.5; expected a number from 0 to 1",
+        "error: --steps is 60; with a --discount below 1, expected 200",
+    ]

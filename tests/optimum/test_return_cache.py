@@ -94,15 +94,15 @@ def test_returns_between_the_lowest_possible_one_and_0_are_plausible(
 ) -> None:
     path, value = tmp_path / "a.npz", share * LOWEST[steps]
     for returns in ({0: value}, {0: -1.0, 1: value, 2: -2.0}):
-        return_cache.write(path, 1.0, steps, returns)
+        return_cache.write(path, 1.0, steps, returns=returns)
         assert return_cache.read(path, 1.0, steps) == (returns if plausible else {})
 
 
 def test_bounds_of_plausible_returns_are_plausible_themselves(tmp_path: Path) -> None:
     path, lowest = tmp_path / "a.npz", 200 * return_cache.LOWEST_REWARD
-    return_cache.write(path, 1.0, 200, {0: lowest, 1: 0.0})
+    return_cache.write(path, 1.0, 200, returns={0: lowest, 1: 0.0})
     assert return_cache.read(path, 1.0, 200) == {0: lowest, 1: 0.0}
-    return_cache.write(path, 1.0, 200, {0: float(np.nextafter(lowest, -np.inf))})
+    return_cache.write(path, 1.0, 200, returns={0: float(np.nextafter(lowest, -np.inf))})
     assert return_cache.read(path, 1.0, 200) == {}
 
 
@@ -180,7 +180,7 @@ def test_cache_of_another_episode_length_is_computed_again(
 def test_file_with_a_flipped_bit_never_gives_another_return(steps: int, tmp_path: Path) -> None:
     path = tmp_path / "gravity_9.81.npz"
     returns = {seed: -seed / 7 for seed in range(10)}
-    return_cache.write(path, 9.81, steps, returns)
+    return_cache.write(path, 9.81, steps, returns=returns)
     valid = path.read_bytes()
     for position in range(len(valid)):
         data = bytearray(valid)

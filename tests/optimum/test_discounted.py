@@ -1,0 +1,138 @@
+"""The optimum for a discount, against Gymnasium's own steps and Bellman's equation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from keras_pendulum.errors import ConfigError
+from keras_pendulum.optimum import discounted
+from keras_pendulum.optimum.discounted import discounted_return, discounted_value, exact_q
+from keras_pendulum.optimum.optimal_return import optimal_return
+from keras_pendulum.optimum.value_iteration import solve, value_at
+
+pytestmark = pytest.mark.quick
+CELLS = 40  # few, for speed
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "keras_pendulum"
+
+
+@pytest.fixture
+def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Makes all tables small; the list has the cells that each computed table was asked for."""
+    asked: list[int] = []
+    solve = discounted._solve
+
+    def solve_coarsely(gravity: float, discount: float, cells: int) -> Any:
+        asked.append(cells)
+        table = solve(gravity, discount, CELLS)
+        return table if cells != discounted.CELLS else np.repeat(table, 10, axis=1)[:, 9:]
+
+    monkeypatch.setattr(discounted, "USUAL_SEEDS", range(20))
+    monkeypatch.setattr(discounted, "_solve", solve_coarsely)
+    return asked
+
+
+@pytest.mark.parametrize(("gravity", "discount"), [(1.0, 0.9), (10.0, 0.98)])
+def test_exact_q_satisfies_bellmans_equation(gravity: float, discount: float) -> None:
+    table = discounted_value(gravity, discount, CELLS)
+    theta = np.linspace(-np.pi, 0, CELLS + 1)
+    for row in (0, 700, 1600, 2500, 3200):
+        speed = np.full(CELLS + 1, -8 + row * 0.005)
+        q = exact_q(table, gravity, discount, theta, speed)
+        assert q.shape == (CELLS + 1, 41)
+        np.testing.assert_allclose(q.max(axis=1), table[row], atol=0.005)
+
+
+def test_exact_q_is_the_reward_and_the_discounted_value_after_a_step_of_gymnasium() -> None:
+    table = discounted_value(10, 0.9, CELLS)
+    env: Any = gymnasium.make("Pendulum-v1", g=10.0).unwrapped
+    torques = np.array([-2.0, 0.3, 1.77])
+    theta, speed = np.array([0.5, -3.0, 2.0]), np.array([-7.9, 0.0, 4.0])
+    q = exact_q(table, 10, 0.9, theta, speed, torques)
+    for i, j in np.ndindex(3, 3):
+        env.reset()
+        env.state = np.array([theta[i], speed[i]])
+        reward = float(env.step(torques[j : j + 1])[1])
+        value = value_at(table, env.state[:1], env.state[1:])[0]
+        assert q[i, j] == pytest.approx(reward + 0.9 * value, abs=1e-9)
+
+
+def test_value_for_discount_0_is_the_first_reward() -> None:
+    table = discounted_value(1, 0, CELLS)
+    assert table[1600] == pytest.approx(-(np.linspace(-np.pi, 0, CELLS + 1) ** 2), abs=1e-5)
+
+
+def test_value_for_discount_1_is_that_of_an_episode() -> None:
+    np.testing.assert_array_equal(discounted_value(1, 1, CELLS), solve(1, 200, CELLS))
+
+
+def test_table_is_computed_once_and_stored(cache: Path, solved: list[int]) -> None:
+    first, again = (discounted_value(1, 0.5) for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+    assert solved == [discounted.CELLS]
+    assert [path.name for path in cache.iterdir()] == ["value_gravity_1_discount_0.5.npz"]
+
+
+@pytest.mark.parametrize("change", ["empty", "text", "other task", "nan", "positive", "shape"])
+def test_damaged_table_is_computed_again(change: str, cache: Path, solved: list[int]) -> None:
+    right = discounted_value(1, 0.5)
+    (path,) = cache.iterdir()
+    arrays: dict[str, Any] = {"gravity": 1.0, "discount": 0.5, "value": right.copy()}
+    if change == "other task":
+        arrays["gravity"] = 2.0
+    elif change == "shape":
+        arrays["value"] = right[:, :-1]
+    else:
+        arrays["value"][7, 7] = np.nan if change == "nan" else 1.0
+    np.savez_compressed(path, **arrays)
+    if change in ("empty", "text"):
+        path.write_bytes(b"" if change == "empty" else b"text")
+    np.testing.assert_array_equal(discounted_value(1, 0.5), right)
+    np.testing.assert_array_equal(discounted_value(1, 0.5), right)
+    assert solved == [discounted.CELLS] * 2
+
+
+@pytest.mark.parametrize(
+    ("gravity", "discount", "cost"), [(1.0, 0.9, 0.245), (10.0, 0.98, 2.65), (1.0, 1.0, 0.0)]
+)
+def test_shipped_returns_are_below_the_optimum_by_what_the_discount_costs(
+    gravity: float, discount: float, cost: float, solved: list[int]
+) -> None:
+    returns, optimum = discounted_return(gravity, discount), optimal_return(gravity)
+    assert (optimum - returns).mean() == pytest.approx(cost, abs=0.02)
+    assert (returns < optimum + 0.05).all()
+    assert not solved
+
+
+def test_shipped_returns_are_those_of_a_computation(
+    solved: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shipped = discounted_return(1, 0.9, range(20))
+    monkeypatch.setattr("keras_pendulum.optimum.discounted.stored_returns", lambda s, f, *_: f(s))
+    computed = discounted_return(1, 0.9, range(20))
+    assert computed.mean() == pytest.approx(shipped.mean(), abs=0.1)
+    assert solved == [discounted.RETURN_CELLS]
+
+
+def test_other_returns_are_computed_once_and_stored(cache: Path, solved: list[int]) -> None:
+    first = discounted_return(1, 0.6, [3, 2000])
+    np.testing.assert_array_equal(discounted_return(1, 0.6, [2000, 5, 3])[[2, 0]], first)
+    assert solved == [discounted.RETURN_CELLS]
+    assert [path.name for path in cache.iterdir()] == ["gravity_1_discount_0.6.npz"]
+
+
+@pytest.mark.parametrize("discount", [-0.1, 1.1, float("nan"), "high", None])
+def test_wrong_discount_is_refused(discount: Any) -> None:
+    with pytest.raises(ConfigError, match=r"discount is .*; expected a number from 0 to 1"):
+        discounted_return(1, discount)
+    with pytest.raises(ConfigError, match=r"discount is .*; expected a number from 0 to 1"):
+        discounted_value(1, discount)
