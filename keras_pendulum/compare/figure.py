@@ -7,14 +7,12 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from keras_pendulum.compare.curve_style import CurveStyle, curve_style
 from keras_pendulum.compare.runs import ComparedRun
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import one_line
 from keras_pendulum.evaluate.evaluation import Score
+from keras_pendulum.train.learning_curve import trailing_mean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,14 +56,6 @@ def draw_comparison(runs: Sequence[ComparedRun], optimum: float | None) -> bytes
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=100)
     return stream.getvalue()
-
-
-def trailing_mean(values: Sequence[float], over: int) -> NDArray[np.float64]:
-    """Returns the mean of each value and those before it, `over` values where there are so many."""
-    sums = np.concatenate(([0.0], np.cumsum(values)))
-    ends = np.arange(1, len(sums))
-    starts = np.maximum(0, ends - over)
-    return (sums[ends] - sums[starts]) / (ends - starts)
 
 
 def _draw_curves(

@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     )
     rerun.add_argument("--overwrite", action="store_true", help="replace the run in DIR")
     shown = parser.add_mutually_exclusive_group()
-    shown.add_argument("--live", action="store_true", help="draw the returns during the run")
+    shown.add_argument("--live", action="store_true", help="draw the learning curve during the run")
     shown.add_argument("--render", action="store_true", help="show the environment in a window")
     parser.add_argument("--quiet", action="store_true", help="print only the closing lines")
     parser.add_argument(
@@ -79,7 +79,6 @@ def _train(arguments: argparse.Namespace) -> int:
     live = _live_plot() if arguments.live else None
 
     with fast_import():
-        from keras_pendulum.evaluate.evaluation import evaluate_policy
         from keras_pendulum.storage.find_weights import find_weights
         from keras_pendulum.storage.weights import load_weights
         from keras_pendulum.train.checkpoint import load_config
@@ -95,11 +94,12 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.init:
         init = load_weights(find_weights(arguments.init), config.activation)
 
+    if live:
+        live.config = config
     folder = RunFolder(out, config.environment)
     log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
     progress = make_progress(config, arguments.quiet)
     new_episodes: list[EpisodeRecord] = []
-    score = None
     started = time.perf_counter()
     try:
         with _Interrupt() as interrupt:
@@ -118,14 +118,18 @@ def _train(arguments: argparse.Namespace) -> int:
         seconds = time.perf_counter() - started
         if live:
             live.finish()
-        if not interrupt.asked:
-            progress.show_phase("evaluating")
-            score = evaluate_policy(result.network)
         progress.show_phase("finished" if result.finished else "interrupted")
     finally:
         progress.end()
     print(
-        closing_lines(config, result, folder, seconds, new_episodes=len(new_episodes), score=score)
+        closing_lines(
+            config,
+            result,
+            folder,
+            seconds,
+            new_episodes=len(new_episodes),
+            score=None if interrupt.asked else result.score,
+        )
     )
     return 130 if interrupt.asked else 0
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from keras_pendulum.display import require_display
 
 if TYPE_CHECKING:
+    from keras_pendulum.config.config import Config
     from keras_pendulum.history import EpisodeRecord
 
 _SECONDS_BETWEEN = 0.5  # between two drawings, which delay the training
@@ -23,35 +24,55 @@ class _Canvas(Protocol):
 
 
 class LivePlot:
-    """A listener for `train_dqn` that draws the episode returns and their 100-episode mean.
+    """A listener for `train_dqn` that draws the learning curve of `rewards.png`, and ε.
 
     In a notebook it draws into the cell's output, else in a window. The run continues when the user
     closes the window. Create the plot before TensorFlow is imported.
 
+    Args:
+        config: the settings of the run. With None, and for `cartpole-original`, the plot shows what
+            the plot of the notebooks shows: the durations and their mean over 100 episodes.
+
+    Attributes:
+        config: the same; it may be set until the first episode.
+
     Raises UserError when there is neither a notebook nor a display.
     """
 
-    def __init__(self) -> None:
-        self._returns: list[float] = []
+    def __init__(self, config: Config | None = None) -> None:
+        self.config = config
+        self._history: list[EpisodeRecord] = []
+        self._levels: dict[str, float] | None = None  # known from the first drawing on
         self._canvas: _Canvas = _NotebookOutput() if _in_notebook() else _Window()
         self._drawn = 0.0
 
     def __call__(self, record: EpisodeRecord) -> None:
         """Adds an episode."""
-        self._returns.append(record.episode_return)
+        self._history.append(record)
         if not self._canvas.closed() and time.monotonic() >= self._drawn + _SECONDS_BETWEEN:
             self._draw()
 
     def finish(self) -> None:
         """Draws the episodes since the last drawing."""
-        if self._returns and not self._canvas.closed():
+        if self._history and not self._canvas.closed():
             self._draw()
 
     def _draw(self) -> None:
-        from keras_pendulum.train import run_figure
-
-        self._canvas.show(run_figure.draw_live_curve(self._returns))
+        self._canvas.show(self._picture())
         self._drawn = time.monotonic()
+
+    def _picture(self) -> bytes:
+        from keras_pendulum.train import live_figure
+        from keras_pendulum.train.reference_returns import reference_returns, run_title
+
+        title = "" if self.config is None else run_title(self.config)
+        if self.config is None or self.config.preset == "cartpole-original":
+            returns = [record.episode_return for record in self._history]
+            return live_figure.draw_durations(returns, title)
+        if self._levels is None:
+            self._levels = reference_returns(self.config)
+        environment = self.config.environment
+        return live_figure.draw_live(self._history, environment, self._levels, title)
 
 
 class _NotebookOutput:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.optimum.phase_plane import EXTENT, PhasePlane
+from keras_pendulum.torque_colors import SCALE
+from keras_pendulum.train.learning_curve import CURVE, draw_episode_axis, draw_learning_curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +21,12 @@ if TYPE_CHECKING:
 
     from keras_pendulum.history import EpisodeRecord
 
-_OPTIMUM = "best possible"  # drawn as a black line
+STYLE: Any = {"font.size": 12, "hatch.linewidth": 0.6}  # legible at half the size too
+WIDTH = 9.6  # inches, as all that follow
+_ROW = 2.4  # height of a panel
+_BETWEEN = 0.95  # two rows: the names and numbers of an axis, and the title of the next one
+_LEGEND = 0.5  # two lines, above the first row
+_TITLE = 0.8
 
 
 def draw_run(
@@ -27,6 +34,7 @@ def draw_run(
     environment: str,
     reference_returns: Mapping[str, float],
     planes: Mapping[str, PhasePlane],
+    title: str = "",
 ) -> bytes:
     """Returns a PNG with the learning curve of a run, its ε, its loss, and phase planes.
 
@@ -36,144 +44,147 @@ def draw_run(
     Args:
         history: at least one record.
         environment: Gymnasium's name.
-        reference_returns: mean returns of an episode of the same length, by name: `best possible`
-            and at most one more. Each becomes a horizontal line with its name in the legend.
+        reference_returns: mean returns of an episode of the same length, by name: `best possible`,
+            `random actions` or others. Each becomes a horizontal line.
         planes: phase planes to draw side by side, by name; may be empty.
+        title: of the figure; its first line is the larger one.
     """
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     evaluated = [record for record in history if not math.isnan(record.greedy_regret)]
     row = 2 if evaluated else 1  # of ε and loss
-    figure = Figure(figsize=(9, (9.5 if planes else 3) + 3 * row))
-    grid = _grid(figure, row + (3 if planes else 1), 2)
-    _draw_learning_curve(figure.add_subplot(grid[0, :]), history, environment, reference_returns)
-    epsilon, loss = figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 1])
-    episodes = [record.episode for record in history]
-    epsilon.plot(episodes, [record.epsilon for record in history], color="#0072B2")
-    epsilon.set(xlabel="Episode", ylabel="ε, share of random actions", ylim=(0, 1))
-    losses = [record.loss for record in history]
-    loss.plot(episodes, losses, ".", color="0.3", markersize=3)
-    loss.set(xlabel="Episode", ylabel="Loss", xlim=epsilon.get_xlim())
-    if any(value > 0 for value in losses):
-        loss.set_yscale("log")
-    if evaluated:
-        axes = figure.add_subplot(grid[1, :], xlim=epsilon.get_xlim())
-        _draw_greedy_regret(axes, evaluated)
-    if planes:
-        _draw_planes(figure, grid[row + 1 :, :], planes)
-    return _png(figure)
+    rows = row + (3 if planes else 1)
+    with rc_context(STYLE):
+        top = _LEGEND + (_TITLE if title else 0.1)
+        figure = Figure(figsize=(WIDTH, _height(rows, top)))
+        draw_title(figure, title)
+        grid = make_grid(figure, rows, 2, top)
+        axes = figure.add_subplot(grid[0, :])
+        draw_learning_curve(axes, history, environment, reference_returns)
+        epsilon, loss = figure.add_subplot(grid[row, 0]), figure.add_subplot(grid[row, 1])
+        draw_epsilon(epsilon, history)
+        _draw_loss(loss, history)
+        if evaluated:
+            axes = figure.add_subplot(grid[1, :])
+            _draw_greedy_regret(axes, evaluated)
+            draw_episode_axis(axes, len(history))
+        if planes:
+            _draw_planes(figure, grid[row + 1 :, :], planes)
+        return png(figure)
 
 
 def draw_phase_planes(planes: Mapping[str, PhasePlane]) -> bytes:
     """Returns a PNG with greedy torques and values, one column for each phase plane."""
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 6.5))
-    _draw_planes(figure, _grid(figure, 1, 1)[0], planes)
-    return _png(figure)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, _height(2, top=0.5)))
+        _draw_planes(figure, make_grid(figure, 2, 1, top=0.5)[:, 0], planes)
+        return png(figure)
 
 
-def draw_live_curve(returns: Sequence[float]) -> bytes:
-    """Returns a PNG of the notebooks' live plot: episode returns and their mean over 100 episodes.
-
-    Args:
-        returns: returns of the episodes so far, at least one.
-    """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.6, 5.4))
-    axes = figure.add_subplot(_grid(figure, 1, 1)[0])
-    _draw_curve(axes, returns, "Return", mean_over=100, lines={})
-    return _png(figure)
+def draw_title(figure: Figure, title: str) -> None:
+    """Writes the title at the upper edge, its first line larger than the second."""
+    height = figure.get_size_inches()[1]
+    first, _, second = title.partition("\n")
+    if first:
+        y = 1 - 0.1 / height
+        figure.text(0.5, y, first, ha="center", va="top", fontsize=15, weight="bold")
+    if second:
+        y = 1 - 0.42 / height
+        figure.text(0.5, y, second, ha="center", va="top", fontsize="small", color="0.3")
 
 
-def _grid(figure: Figure, rows: int, columns: int) -> GridSpec:
-    """Returns a grid with margins for the axes' labels.
+def draw_epsilon(axes: Axes, history: Sequence[EpisodeRecord]) -> None:
+    """Draws the share of random actions."""
+    axes.plot([record.epsilon for record in history], color=CURVE, linewidth=2)
+    axes.set(ylabel="Random actions (ε)", ylim=(-0.02, 1.02))
+    draw_episode_axis(axes, len(history))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")
 
-    Matplotlib's layout engines compute such margins too, but they draw the figure twice.
+
+def make_grid(figure: Figure, rows: int, columns: int, top: float) -> GridSpec:
+    """Returns a grid of panels that are equally high in figures of any height.
+
+    Matplotlib's layout engines compute margins too, but they draw the figure twice.
     """
     width, height = figure.get_size_inches()
     return figure.add_gridspec(
         rows,
         columns,
-        left=0.9 / width,
-        right=1 - 0.2 / width,
-        bottom=0.55 / height,
-        top=1 - 0.4 / height,
-        wspace=0.3,
-        hspace=0.36,
+        left=0.95 / width,
+        right=1 - 0.25 / width,
+        bottom=0.65 / height,
+        top=1 - top / height,
+        wspace=0.32,
+        hspace=_BETWEEN / _ROW,
     )
 
 
-def _draw_learning_curve(
-    axes: Axes,
-    history: Sequence[EpisodeRecord],
-    environment: str,
-    reference_returns: Mapping[str, float],
-) -> None:
-    if TASKS[environment].never_terminates:
-        values = [record.average_reward for record in history]
-        steps = history[-1].environment_steps / (history[-1].episode + 1)  # per episode
-        lines = {name: value / steps for name, value in reference_returns.items()}
-        _draw_curve(axes, values, "Average reward per step", mean_over=10, lines=lines)
-    else:  # every step has reward 1, so the curve shows the return
-        values = [record.episode_return for record in history]
-        _draw_curve(axes, values, "Return (steps)", mean_over=10, lines=reference_returns)
+def png(figure: Figure) -> bytes:
+    """Returns the figure as a PNG file."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=100)
+    return stream.getvalue()
+
+
+def _height(rows: int, top: float) -> float:
+    return top + rows * _ROW + (rows - 1) * _BETWEEN + 0.65
+
+
+def _draw_loss(axes: Axes, history: Sequence[EpisodeRecord]) -> None:
+    losses = [record.loss for record in history]
+    axes.plot(losses, ".", color="0.3", markersize=3)
+    axes.set_ylabel("Loss (mean of the updates)")
+    draw_episode_axis(axes, len(history))
+    if any(value > 0 for value in losses):
+        axes.set_yscale("log")
+        _label_few_numbers(axes)
+
+
+def _label_few_numbers(axes: Axes) -> None:
+    """Labels whole powers of ten, or where there are none, other short numbers."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    low, high = axes.get_ylim()
+    subs = (1.0,) if high > 100 * low else (1.0, 2.0, 5.0)
+    axes.yaxis.set_major_locator(LogLocator(subs=subs, numticks=6))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_greedy_regret(axes: Axes, evaluated: Sequence[EpisodeRecord]) -> None:
     """Draws the greedy regret of each evaluated episode, and marks the best of them."""
     episodes = [record.episode for record in evaluated]
     regrets = [record.greedy_regret for record in evaluated]
-    axes.plot(episodes, regrets, ".-", color="#0072B2", label="greedy policy, without exploration")
+    axes.plot(episodes, regrets, ".-", color=CURVE, label="greedy policy, without exploration")
     best = min(evaluated, key=lambda record: (record.greedy_regret, -record.episode))
     name = f"best: {best.greedy_regret:.2f} after episode {best.episode}"
-    axes.plot(best.episode, best.greedy_regret, "o", color="#D55E00", label=name)
+    axes.plot(best.episode, best.greedy_regret, "D", color="#D55E00", label=name)
     axes.set_yscale("symlog", linthresh=1)  # logarithmic from 1 on; a regret can be 0
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylim(min(0, *regrets) - 0.1, 2 * max(1, *regrets))  # no point is on the frame
-    axes.set(xlabel="Episode", ylabel="Greedy regret")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, frameon=False)
-
-
-def _draw_curve(
-    axes: Axes,
-    values: Sequence[float],
-    label: str,
-    *,
-    mean_over: int,
-    lines: Mapping[str, float],
-) -> None:
-    """Draws one value per episode, their running mean, and horizontal lines."""
-    axes.plot(values, ".", color="0.65", markersize=4, label="episode")
-    if len(values) >= mean_over:
-        mean = np.convolve(values, np.ones(mean_over) / mean_over, "valid")
-        episodes = range(mean_over - 1, len(values))
-        name = f"mean of {mean_over} episodes"
-        axes.plot(episodes, mean, color="#0072B2", linewidth=2, label=name)
-    for name, height in lines.items():
-        color, style = ("black", "--") if name == _OPTIMUM else ("#D55E00", ":")
-        axes.axhline(height, color=color, linestyle=style, label=name)
-    axes.autoscale(axis="y")  # without it, a line can coincide with the frame
-    axes.set(xlabel="Episode", ylabel=label)
-    # The legend is above the axes, where it hides no episode.
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, frameon=False)
+    axes.set_ylabel("Greedy regret")
+    axes.legend(
+        loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, frameon=False, fontsize="small"
+    )
 
 
 def _draw_planes(figure: Figure, place: SubplotSpec, planes: Mapping[str, PhasePlane]) -> None:
-    """Draws torques in the upper row and values in the lower one, with one scale for each row.
+    """Draws torques in the upper row and values in the lower one, with one scale for each row."""
+    from matplotlib.colors import LinearSegmentedColormap
 
-    The lightness of both colour maps increases monotonically, so they are legible in black and
-    white.
-    """
-    rows = {
-        "torque": ("Greedy torque (N·m)", "cividis"),
-        "value": ("Value (discounted return)", "viridis"),
+    rows: dict[str, tuple[str, Any]] = {
+        "torque": ("Greedy torque (N·m)", LinearSegmentedColormap.from_list("torque", SCALE)),
+        "value": ("Discounted return", "viridis"),  # lighter and lighter, also without colour
     }
-    grid = place.subgridspec(2, len(planes), wspace=0.28, hspace=0.4)
+    grid = place.subgridspec(2, len(planes), wspace=0.34, hspace=_BETWEEN / _ROW)
     for row, (attribute, (label, colors)) in enumerate(rows.items()):
         maps = {name: getattr(plane, attribute) for name, plane in planes.items()}
         all_values = np.stack(list(maps.values()))
+        limits = (-2.0, 2.0) if attribute == "torque" else (all_values.min(), all_values.max())
         row_axes = []
         for column, (name, values) in enumerate(maps.items()):
             axes = figure.add_subplot(grid[row, column])
@@ -183,16 +194,26 @@ def _draw_planes(figure: Figure, place: SubplotSpec, planes: Mapping[str, PhaseP
                 extent=EXTENT,
                 aspect="auto",
                 cmap=colors,
-                vmin=all_values.min(),
-                vmax=all_values.max(),
+                vmin=limits[0],
+                vmax=limits[1],
             )
+            if attribute == "torque":
+                _hatch_clockwise(axes, values)
+            axes.set_yticks([-8, -4, 0, 4, 8])
             axes.set_xticks([-np.pi, 0, np.pi], ["-π", "0 (upright)", "π"])
             axes.set(title=name, xlabel="θ (rad)", ylabel="θ̇ (rad/s)")
+            axes.title.set_fontsize("medium")
             row_axes.append(axes)
-        figure.colorbar(image, ax=row_axes, label=label, fraction=0.1, pad=0.03)
+        bar = figure.colorbar(image, ax=row_axes, label=label, fraction=0.1, pad=0.03)
+        if attribute == "torque":
+            bar.set_ticks([-2, -1, 0, 1, 2])
+            _hatch_clockwise(bar.ax, np.array([[-1.0, -1.0], [1.0, 1.0]]), (0, 1, -2, 2))
 
 
-def _png(figure: Figure) -> bytes:
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=100)
-    return stream.getvalue()
+def _hatch_clockwise(
+    axes: Axes, torques: NDArray[np.float64], extent: tuple[float, float, float, float] = EXTENT
+) -> None:
+    """Hatches the torques below 0, which have the darkness of those above 0."""
+    if torques.min() < 0:
+        hatched = axes.contourf(torques, [-3, -1e-9], extent=extent, colors="none", hatches=["//"])
+        hatched.set_edgecolor("#ffffff99")

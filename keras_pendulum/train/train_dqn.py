@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from typing import Literal
 from keras_pendulum.config.config import Config
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.errors import UserError, require_type
-from keras_pendulum.evaluate.evaluation import optimal_training_return, random_return
+from keras_pendulum.evaluate.evaluation import Score, evaluate_policy
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.phase_plane import run_phase_planes
 from keras_pendulum.storage.atomic_write import write_atomically
@@ -21,6 +20,7 @@ from keras_pendulum.train import run_figure
 from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 from keras_pendulum.train.evaluations import BestWeights, evaluate_if_due
 from keras_pendulum.train.loop import train_episodes
+from keras_pendulum.train.reference_returns import reference_returns, run_title
 from keras_pendulum.train.run import Run, make_run
 from keras_pendulum.train.run_folder import RunFolder
 
@@ -34,6 +34,7 @@ class TrainingResult:
     network: DQN
     history: list[EpisodeRecord]
     finished: bool  # false where `should_stop` ended the run before its last episode
+    score: Score | None = None  # greedy, of a finished run with a folder, for the picture's title
 
 
 def train_dqn(
@@ -101,13 +102,16 @@ def train_dqn(
                 save_checkpoint(run, folder.weights)
                 folder.remove_old_run()
         run.agent.on_compile = lambda: on_phase("compiling")
+        score = None
         if folder is None:
             finished = _train(run, hooks)
         else:
             best = BestWeights(folder.best, run.history) if config.keep_best else None
             folder.start_files(config, run.history)
             finished = _train_in_folder(run, folder, best, hooks)
-    return TrainingResult(run.agent.online, run.history, finished)
+            if finished:
+                score = _draw(run, folder, hooks)
+    return TrainingResult(run.agent.online, run.history, finished, score)
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ class _Hooks:
 
 
 def _train_in_folder(run: Run, folder: RunFolder, best: BestWeights | None, hooks: _Hooks) -> bool:
-    """Trains as `_train` does, and writes history, checkpoints, best weights and the picture."""
+    """Trains as `_train` does, and writes history, checkpoints and the best weights."""
     config = run.config
     last_saved = -1  # the episode of the last checkpoint
     with CheckpointWriter(folder.weights, folder.require_not_moved) as writer:
@@ -146,18 +150,26 @@ def _train_in_folder(run: Run, folder: RunFolder, best: BestWeights | None, hook
         finished = _train(run, hooks, write_files)
         if run.history[-1].episode != last_saved:
             save()
-    if finished:
-        hooks.on_phase("drawing")
-        planes = run_phase_planes(run.agent.online, config)
-        returns = _reference_returns(config)
-        try:
-            picture = run_figure.draw_run(run.history, config.environment, returns, planes)
-        except (OSError, ImportError) as error:  # such as too many open files
-            raise UserError(
-                f"cannot draw {folder.picture}: {error}; the run is saved, and --resume draws it"
-            ) from error
-        write_atomically(folder.picture, picture)
     return finished
+
+
+def _draw(run: Run, folder: RunFolder, hooks: _Hooks) -> Score:
+    """Evaluates the finished run and writes its picture; returns the score in its title."""
+    config = run.config
+    hooks.on_phase("evaluating")
+    score = evaluate_policy(run.agent.online)
+    hooks.on_phase("drawing")
+    planes = run_phase_planes(run.agent.online, config)
+    returns = reference_returns(config)
+    title = run_title(config, score)
+    try:
+        picture = run_figure.draw_run(run.history, config.environment, returns, planes, title)
+    except (OSError, ImportError) as error:  # such as too many open files
+        raise UserError(
+            f"cannot draw {folder.picture}: {error}; the run is saved, and --resume draws it"
+        ) from error
+    write_atomically(folder.picture, picture)
+    return score
 
 
 def _train(run: Run, hooks: _Hooks, *first_listeners: Callable[[EpisodeRecord], None]) -> bool:
@@ -169,12 +181,3 @@ def _train(run: Run, hooks: _Hooks, *first_listeners: Callable[[EpisodeRecord], 
         if hooks.should_stop() and record.episode + 1 < run.config.episodes:
             return False
     return True
-
-
-def _reference_returns(config: Config) -> dict[str, float]:
-    """Returns the mean returns of a training episode that the picture compares with, by name."""
-    optimum = optimal_training_return(config)
-    if math.isnan(optimum):
-        return {}
-    random = random_return(config.environment, config.gravity, config.max_episode_steps)
-    return {"best possible": optimum, "random actions": random}

@@ -141,7 +141,7 @@ def test_tensorboard_shows_curves_and_phase_planes(in_process: Command, tmp_path
     assert settings["learning_rate"].number_value == 1e-3
     maps = {event.step: event.tensor_proto.string_val for event in events.Tensors("phase plane")}
     assert list(maps) == [0, 42, 50, 51]
-    assert tf.io.decode_png(maps[51][2]).shape == (650, 900, 4)
+    assert tf.io.decode_png(maps[51][2]).shape == (690, 960, 4)
     done = in_process("train", *words[:-1], "--episodes", "2", "--overwrite")
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "run" / "tensorboard").exists()  # no curves of another run

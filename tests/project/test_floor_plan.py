@@ -18,7 +18,7 @@ ROOMS = (
     *("storage", "dqn", "config", "environments"),
 )
 WITHOUT_ROOM = (
-    *("cli", "completion", "display", "keras_registration", "tensorflow_setup"),
+    *("cli", "completion", "display", "keras_registration", "tensorflow_setup", "torque_colors"),
     *("history", "version", "errors"),
 )
 ORDER = ("__main__", *ROOMS, *WITHOUT_ROOM)

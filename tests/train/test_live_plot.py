@@ -1,9 +1,13 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from conftest import Command
+from figure_texts import figure_of, require_legible
 
+import keras_pendulum as kp
 from keras_pendulum.errors import UserError
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.train import live_plot
@@ -12,7 +16,7 @@ pygame = pytest.importorskip("pygame")
 
 
 def record(episode: int) -> EpisodeRecord:
-    return EpisodeRecord(episode, 1.0, 10.0 * episode, 0.5, 0.1, 10 * episode, episode, 0.1)
+    return EpisodeRecord(episode, 1.0, 10.0 * episode, 0.5, 0.1, 10 * (episode + 1), episode, 0.1)
 
 
 @pytest.fixture
@@ -36,6 +40,36 @@ def test_window_shows_the_curve_and_each_new_episode(window: live_plot.LivePlot)
     window(record(2))
     assert (window_pixels() != before).any()
     pygame.display.quit()
+
+
+@pytest.mark.parametrize(
+    ("preset", "panels", "quantity", "lines"),
+    [
+        ("reference", 2, "Reward per step", 4),
+        ("cartpole", 2, "Return (steps)", 4),
+        ("cartpole-original", 1, "Duration (steps)", 2),
+    ],
+)
+def test_plot_shows_the_learning_curve_of_the_run(
+    preset: str,
+    panels: int,
+    quantity: str,
+    lines: int,
+    window: live_plot.LivePlot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    window.config = kp.preset(preset, seed=7)
+    monkeypatch.setattr(window, "_drawn", math.inf)  # the window draws nothing
+    for episode in range(120):
+        window(record(episode))
+        if episode in (0, 2, 119):
+            figure = figure_of(window._picture)
+            require_legible(figure)
+            assert len(figure.axes) == panels
+            assert figure.texts[0].get_text() == f"{preset}, seed 7"
+            curve = figure.axes[0]
+            assert (curve.get_ylabel(), len(curve.get_lines())) == (quantity, lines)
+            assert len(np.asarray(curve.get_lines()[1].get_ydata())) == episode + 1
 
 
 def test_finish_draws_episodes_since_the_last_drawing(

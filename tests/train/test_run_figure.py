@@ -6,39 +6,74 @@ import math
 import matplotlib.image
 import numpy as np
 import pytest
+from figure_texts import figure_of, require_legible
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.optimum.phase_plane import network_phase_plane, optimal_phase_plane
+from keras_pendulum.optimum.phase_plane import (
+    PhasePlane,
+    network_phase_plane,
+    optimal_phase_plane,
+)
+from keras_pendulum.torque_colors import CLOCKWISE, COUNTERCLOCKWISE, NO_TORQUE
 from keras_pendulum.train import run_figure
 
-
-def picture_size(png: bytes) -> tuple[int, ...]:
-    """Returns height and width in pixels."""
-    return matplotlib.image.imread(io.BytesIO(png)).shape[:2]
+LEVELS = {"best possible": -40.0, "best for γ = 0.9": -41.0, "random actions": -900.0}
+TITLE = "reference, seed 0: regret 1.87\nPendulum-v1, g = 1 · keras_pendulum 0.1.0"
 
 
-def test_run_is_drawn_with_and_without_phase_planes_losses_and_evaluations() -> None:
-    def record(episode: int, loss: float) -> EpisodeRecord:
-        return EpisodeRecord(episode, -1.0, -200.0, 0.5, loss, 200 * (episode + 1), episode, 0.1)
-
-    history = [record(i, math.nan if i < 5 else 1 / i) for i in range(30)]
-    planes = {"one": network_phase_plane(kp.DQN((8,))), "two": optimal_phase_plane(1.0, 0.5)}
-    returns = {"best possible": -40.0, "random actions": -900.0}
-    sizes = [
-        picture_size(run_figure.draw_run(records, "Pendulum-v1", returns, planes_or_none))
-        for planes_or_none in (planes, {})
-        for records in (history, history[:1])
+def make_history(episodes: int, evaluate_every: int = 0) -> list[EpisodeRecord]:
+    """Returns records with a loss from episode 41 on, within one power of ten in 60 episodes."""
+    return [
+        EpisodeRecord(
+            i,
+            -5.0 + 4.8 * i / episodes,
+            -1000.0,
+            max(0.01, 0.99**i),
+            math.nan if i < 41 else 0.3 * 0.98**i,
+            200 * (i + 1),
+            i,
+            0.1,
+            700.0 / (i + 1) if evaluate_every and (i + 1) % evaluate_every == 0 else math.nan,
+        )
+        for i in range(episodes)
     ]
-    assert sizes == [(1250, 900)] * 2 + [(600, 900)] * 2
-    assert picture_size(run_figure.draw_phase_planes(planes)) == (650, 900)
-    history[19] = history[19]._replace(greedy_regret=3.0)
-    sizes = [
-        picture_size(run_figure.draw_run(history, "Pendulum-v1", returns, planes_or_none))
-        for planes_or_none in (planes, {})
-    ]
-    assert sizes == [(1550, 900), (900, 900)]
+
+
+@pytest.fixture(scope="module")
+def planes() -> dict[str, PhasePlane]:
+    return {"one": network_phase_plane(kp.DQN((8,))), "two": optimal_phase_plane(1.0, 0.5)}
+
+
+@pytest.mark.parametrize("with_planes", [True, False])
+@pytest.mark.parametrize(("episodes", "every"), [(1, 0), (60, 0), (60, 10), (500, 50)])
+def test_no_text_of_a_run_overlaps_another_or_leaves_the_picture(
+    episodes: int, every: int, with_planes: bool, planes: dict[str, PhasePlane]
+) -> None:
+    history, shown = make_history(episodes, every), planes if with_planes else {}
+    figure = figure_of(lambda: run_figure.draw_run(history, "Pendulum-v1", LEVELS, shown, TITLE))
+    require_legible(figure)
+    # Colour bars have axes of their own.
+    assert len(figure.axes) == 3 + bool(every) + 6 * with_planes
+    assert [text.get_text() for text in figure.texts] == TITLE.splitlines()
+
+
+def test_no_text_of_phase_planes_overlaps_another(planes: dict[str, PhasePlane]) -> None:
+    require_legible(figure_of(lambda: run_figure.draw_phase_planes(planes)))
+
+
+def test_torques_have_the_colours_of_the_other_pictures(planes: dict[str, PhasePlane]) -> None:
+    figure = figure_of(lambda: run_figure.draw_phase_planes(planes))
+    (image,) = figure.axes[0].get_images()
+    for torque, color in ((-2.0, CLOCKWISE), (0.0, NO_TORQUE), (2.0, COUNTERCLOCKWISE)):
+        assert image.to_rgba(np.array([torque]))[0] == pytest.approx(to_rgba(color), abs=0.01)
+
+
+def test_picture_is_a_png() -> None:
+    png = run_figure.draw_run(make_history(2), "Pendulum-v1", LEVELS, {})
+    assert matplotlib.image.imread(io.BytesIO(png)).shape[1] == 960
 
 
 def test_greedy_regret_is_drawn_by_episode_with_its_best() -> None:
@@ -56,29 +91,6 @@ def test_greedy_regret_is_drawn_by_episode_with_its_best() -> None:
     low, high = axes.get_ylim()
     assert low < -0.05  # no point is on the frame
     assert high > 1000
-
-
-@pytest.mark.parametrize(
-    ("environment", "value", "optimum"), [("Pendulum-v1", -2, -0.5), ("CartPole-v1", -120, -30)]
-)
-def test_reference_lines_have_the_scale_of_the_episodes(
-    environment: str, value: float, optimum: float
-) -> None:
-    history = [EpisodeRecord(i, -2.0, -120.0, 0.5, 0.1, 60 * (i + 1), i, 0.1) for i in range(3)]
-    axes = Figure().subplots()
-    run_figure._draw_learning_curve(axes, history, environment, {"best possible": -30.0})
-    episodes, line = axes.get_lines()
-    assert list(np.asarray(episodes.get_ydata())) == [value] * 3
-    assert list(np.asarray(line.get_ydata())) == [optimum] * 2
-
-
-def test_reference_line_does_not_coincide_with_the_frame() -> None:
-    axes = Figure().subplots()
-    lines = {"best possible": 0.04, "random actions": -1.04}  # just inside the default margins
-    run_figure._draw_curve(axes, [0.0, -1.0], "Return", mean_over=10, lines=lines)
-    low, high = axes.get_ylim()
-    assert high - 0.04 > 0.03
-    assert -1.04 - low > 0.03
 
 
 def test_phase_planes_have_their_lowest_speed_at_the_bottom() -> None:

@@ -85,6 +85,11 @@ def test_should_stop_ends_the_run_after_an_episode(
     )
     assert (len(result.history), result.finished) == (stop_after, finished)
     assert (tmp_path / "rewards.png").exists() == finished
+    if finished:
+        assert result.score is not None
+        assert result.score.regret == kp.evaluate_policy(result.network).regret
+    else:
+        assert result.score is None
     assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", config).history) == stop_after
 
 
@@ -99,7 +104,7 @@ def test_environment_is_closed_however_the_run_ends(
 
     config, longer = (kp.preset("original", hidden_units=(8,), episodes=n) for n in (1, 2))
     kp.train_dqn(config, tmp_path)
-    assert len(closed) == 1
+    assert len(closed) == 2  # that of the run, and that of the evaluation after it
     for options in ({"overwrite": True}, {"resume": True}):
         closed.clear()
         with pytest.raises(ZeroDivisionError):
