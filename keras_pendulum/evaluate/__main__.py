@@ -7,20 +7,15 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
+from keras_pendulum.cli import OneLineParser, add_activation_flag, run_command
 from keras_pendulum.completion import complete_with, weights_files
-from keras_pendulum.display import draw_without_display, require_display
-from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
-from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
+from keras_pendulum.evaluate.film_command import add_film_flags, make_films, require_film_files
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
-
-if TYPE_CHECKING:
-    from keras_pendulum.dqn.network import DQN
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.evaluate") -> int:
@@ -49,9 +44,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     add_activation_flag(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--render", action="store_true", help="show the episodes in a window")
-    parser.add_argument(
-        "--gif", type=nonempty_path, metavar="FILE", help="save a film of the first episode"
-    )
+    add_film_flags(parser)
     complete_with(weights, weights_files(shipped_names))
     arguments = parser.parse_args(argv)
     return run_command(lambda: _evaluate(arguments))
@@ -59,13 +52,13 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 def _evaluate(arguments: argparse.Namespace) -> int:
     require_tensorflow()
-    if arguments.gif:
-        require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
+    require_film_files(arguments)
     if arguments.render:
         require_display()
 
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluate_policy
+        from keras_pendulum.evaluate.loaded_policy import Policy
         from keras_pendulum.storage.find_weights import find_weights
         from keras_pendulum.storage.weights import load_weights
 
@@ -83,8 +76,8 @@ def _evaluate(arguments: argparse.Namespace) -> int:
         render_mode="human" if arguments.render else None,
         on_step=require_open_window,
     )
-    if arguments.gif:
-        _film(network, arguments.seed, score.gravity, arguments.gif)
+    if arguments.gif or arguments.video:
+        make_films(arguments, Policy(network), score.environment, score.gravity, path.stem)
     if arguments.json:
         print(json.dumps({"weights": str(path), **score.as_json()}))
     else:
@@ -97,25 +90,6 @@ def _window_closed() -> bool:
     import pygame
 
     return bool(pygame.event.get(pygame.QUIT))
-
-
-def _film(network: DQN, seed: int, gravity: float | None, path: str) -> None:
-    """Writes a GIF of the first episode in real time, with ten frames per second."""
-    from keras_pendulum.evaluate.evaluation import evaluate_policy
-    from keras_pendulum.evaluate.film import encode_gif
-
-    draw_without_display()
-    frames: list[Any] = []
-    evaluate_policy(
-        network,
-        1,
-        seed,
-        gravity=gravity,
-        render_mode="rgb_array",
-        on_step=lambda env: frames.append(env.render()),
-    )
-    interval = round(0.1 / TASKS[network.provenance.environment].seconds_per_step)
-    write_atomically(path, encode_gif(frames[::interval], seconds_per_frame=0.1))
 
 
 if __name__ == "__main__":

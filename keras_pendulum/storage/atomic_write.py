@@ -90,7 +90,7 @@ def _flush_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def require_no_other_file(path: Path, beginning: bytes, kind: str) -> None:
+def require_no_other_file(path: Path, beginning: bytes, kind: str, offset: int = 0) -> None:
     """Raises UserError when `path` exists and its content does not start with `beginning`.
 
     A wrong completion in the shell could otherwise replace the weights by the output of a command.
@@ -99,11 +99,12 @@ def require_no_other_file(path: Path, beginning: bytes, kind: str) -> None:
         path: the file to write.
         beginning: the first bytes of every file of this kind.
         kind: the kind of file, for the message, such as "a GIF".
+        offset: place of `beginning`, where other bytes are before it.
     """
     try:
         if path.is_file():
             with open(path, "rb") as file:
-                is_other = file.read(len(beginning)) != beginning
+                is_other = file.read(offset + len(beginning))[offset:] != beginning
         else:  # writing to a folder fails later, with its own message
             is_other = path.exists() and not path.is_dir()
     except OSError as error:

@@ -230,7 +230,7 @@ def test_gif_shows_the_first_episode(command: Command, tmp_path: Path) -> None:
         done = command("evaluate", "reference", "--episodes", "1", "--gif", "film.gif")
     assert done.returncode == 0, done.stderr
     with Image.open(tmp_path / "film.gif") as film:
-        assert film.size == (250, 250)
+        assert film.size == (320, 448)
         assert len(list(ImageSequence.Iterator(film))) > 50  # Pillow merges equal frames
     assert done.stderr == ""
     assert (tmp_path / "film.gif").stat().st_size < 500_000
@@ -243,7 +243,7 @@ def test_gif_has_the_shape_and_speed_of_the_environment(
         in_process("evaluate", "cartpole", "--episodes", "1", "--gif", "film.gif").returncode == 0
     )
     with Image.open(tmp_path / "film.gif") as film:
-        assert film.size == (375, 250)
+        assert film.size == (320, 342)
         shown = sum(frame.info["duration"] for frame in ImageSequence.Iterator(film))
     assert shown == pytest.approx(500 * 20, rel=0.03)  # ms
 
@@ -321,6 +321,14 @@ WRONG = [
     (["evaluate", "n" * 300], "File name too long"),
     (["evaluate", "reference", "--gif", "text.h5"], "text.h5 holds something else than a GIF"),
     (["evaluate", "reference", "--gif", "n" * 300], "File name too long"),
+    (["evaluate", "reference", "--video", "film.avi"], "expected a name that ends in .mp4"),
+    (["evaluate", "reference", "--start", "hanging"], "--start is the start of a film"),
+    (["evaluate", "reference", "--gif", "a.gif", "--start", "down"], "'down' is no start"),
+    (["evaluate", "reference", "--gif", "a.gif", "--start", "181"], "'181' is no start"),
+    (
+        ["evaluate", "cartpole", "--episodes", "1", "--gif", "a.gif", "--start", "0"],
+        "--start belongs to Pendulum-v1; CartPole-v1 has none: use --seed",
+    ),
     (["evaluate", "reference", "--episodes", "0"], "episodes is 0"),
     (["evaluate", "reference", "--seed", "-1"], "seed is -1"),
     (["evaluate", "reference", "--gravity", "nan"], "gravity is nan"),

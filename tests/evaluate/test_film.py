@@ -1,0 +1,173 @@
+"""Films: their starts, their numbers, and the program that makes videos."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import math
+import shutil
+import stat
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import keras_pendulum as kp
+from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.evaluate import film, film_frame, film_start
+from keras_pendulum.evaluate.film_frame import Moment, draw_frame
+from keras_pendulum.torque_colors import CLOCKWISE, COUNTERCLOCKWISE, rgb
+
+pytestmark = pytest.mark.quick
+
+TITLES = ("swingup, g = 10 m/s²", "start: hanging")
+SCENE = np.full((500, 500, 3), 255, np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("text", "angle"),
+    [("hanging", 180), ("upright", 0), ("90", 90), ("-12.5", -12.5), ("-180", -180)],
+)
+def test_start_is_a_name_or_an_angle(text: str, angle: float) -> None:
+    assert film_start.parse_start(text) == angle
+
+
+@pytest.mark.parametrize("text", ["", "down", "nan", "inf", "180.1", "1 2"])
+def test_other_starts_are_refused(text: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError, match="expected hanging, upright, or an angle"):
+        film_start.parse_start(text)
+
+
+@pytest.mark.parametrize("angle", [180.0, 0.0, 90.0, -12.5])
+def test_reset_puts_the_pendulum_at_the_angle_at_rest(angle: float) -> None:
+    env: Any = make_environment("Pendulum-v1", 10.0)
+    observation = film_start.reset(env, 3, angle)
+    theta = math.radians(angle)
+    assert observation == pytest.approx([math.cos(theta), math.sin(theta), 0], abs=1e-6)
+    assert observation.dtype == np.float32
+    next_observation = env.step(np.array([0.0]))[0]
+    speed = 0.05 * 15 * math.sin(theta)
+    assert next_observation[2] == pytest.approx(speed, abs=1e-6)
+
+
+def test_optimum_of_a_start_is_that_of_its_seed_or_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[Any] = []
+
+    def best_return(gravity: float, starts: Any, steps: int) -> Any:
+        found.append((gravity, starts.tolist(), steps))
+        return np.array([-7.0])
+
+    monkeypatch.setattr(film_start, "best_return", best_return)
+    optimum = film_start.optimum_of_start
+    assert optimum("Pendulum-v1", 1.0, 3, None) == kp.optimal_return(1.0, [3])[0]
+    assert optimum("CartPole-v1", None, 3, None) == 500
+    assert found == []
+    assert optimum("Pendulum-v1", 2.0, 3, 180.0) == -7
+    assert found == [(2.0, [[math.pi, 0.0]], 200)]
+
+
+def test_film_shows_each_step_with_the_return_of_the_evaluation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    moments: list[Moment] = []
+
+    def record(pixels: Any, moment: Moment) -> Image.Image:
+        moments.append(moment)
+        return Image.new("RGB", (2, 2))
+
+    monkeypatch.setattr(film, "draw_frame", record)
+    policy = kp.load_policy("reference")
+    pictures = list(film.film_episode(policy, "Pendulum-v1", 1.0, name="mine", seed=5))
+    score = kp.evaluate_policy(policy, 1, seed=5)
+    assert len(pictures) == 201
+    assert [moment.step for moment in moments] == list(range(201))
+    assert moments[0].titles == ("mine, g = 1 m/s²", "start of seed 5")
+    assert moments[-1].total == pytest.approx(score.mean_return)
+    assert moments[-1].optimum == score.optimal_mean_return
+    first = policy(np.asarray(make_environment("Pendulum-v1", 1.0).reset(seed=5)[0]))
+    assert moments[1].torque == first[0]
+    shown = film.shown_in_gif(pictures, 0.05)
+    assert len(shown) == 101
+    assert shown[-1] is pictures[-1]
+
+
+def test_frame_is_cropped_and_shows_the_torque() -> None:
+    scene = SCENE.copy()
+    scene[:110] = scene[-110:] = 0  # outside the circle of the rod
+    bars = []
+    for torque in (-2.0, 2.0):
+        moment = Moment(TITLES, step=7, steps=200, torque=torque, total=-276.5, optimum=-295.6)
+        picture = draw_frame(scene, moment)
+        assert picture.size == (320, 448)
+        assert picture.getpixel((160, 50)) == (255, 255, 255)
+        row = 44 + 320 + 18
+        bars.append([picture.getpixel((x, row)) for x in (200, 270)])
+    white = (255, 255, 255)
+    assert bars == [[rgb(CLOCKWISE), white], [white, rgb(COUNTERCLOCKWISE)]]
+
+
+@pytest.mark.parametrize("torque", [-2.0, None])
+def test_texts_of_a_frame_do_not_overlap_and_are_inside(
+    torque: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from PIL import ImageDraw
+
+    boxes: list[tuple[float, float, float, float]] = []
+    draw_text = ImageDraw.ImageDraw.text
+
+    def record(self: Any, xy: Any, text: str, fill: Any, font: Any, anchor: str = "la") -> None:
+        boxes.append(self.textbbox(xy, text, font=font, anchor=anchor))
+        draw_text(self, xy, text, fill, font, anchor=anchor)
+
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", record)
+    titles = ("pendulum_weight, g = 100 m/s²", "start of seed 4294967295")
+    moment = Moment(titles, step=200, steps=200, torque=torque, total=-3255.1, optimum=-1758.3)
+    picture = draw_frame(SCENE, moment)
+    assert len(boxes) == (9 if torque is not None else 7)
+    for i, (left, top, right, bottom) in enumerate(boxes):
+        assert left >= 0 and top >= 0 and right <= picture.width and bottom <= picture.height
+        for other in boxes[:i]:
+            apart = right <= other[0] or left >= other[2] or bottom <= other[1] or top >= other[3]
+            assert apart, (boxes[i], other)
+
+
+def test_gif_loops_with_the_pictures() -> None:
+    pictures = [Image.new("RGB", (4, 4), color) for color in ("red", "blue", "red")]
+    with Image.open(io.BytesIO(film.encode_gif(pictures))) as gif:
+        assert (gif.n_frames, gif.info["duration"], gif.info["loop"]) == (3, 100, 0)  # type: ignore[attr-defined]
+
+
+def test_video_without_ffmpeg_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(kp.UserError, match="--video needs the program ffmpeg: install it"):
+        film.find_ffmpeg()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for ffmpeg is a script")
+@pytest.mark.parametrize("works", [True, False])
+def test_ffmpeg_gets_the_pictures_and_its_failure_is_one_line(works: bool, tmp_path: Path) -> None:
+    program = tmp_path / "ffmpeg"
+    # Writes its words and the number of its input's bytes to its last word, the film.
+    success = 'for film; do :; done; echo "$* $(wc -c)" > "$film"'
+    failure = "echo first >&2; echo second >&2; exit 1"
+    program.write_text(f"#!/bin/sh\n{success if works else failure}\n", encoding="utf-8")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    pictures = [Image.new("RGB", (4, 6))] * 3
+    if not works:
+        with pytest.raises(kp.UserError, match=r"^ffmpeg failed: first.*second$") as caught:
+            film.encode_mp4(str(program), pictures, 0.05)
+        assert "\n" not in str(caught.value)
+        return
+    words = film.encode_mp4(str(program), pictures, 0.05).decode().split()
+    assert "4x6" in words
+    assert words[words.index("-r") + 1] == "20"
+    assert words[-1] == str(3 * 4 * 6 * 3)
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
+def test_video_is_an_mp4() -> None:
+    pictures = [Image.new("RGB", (film_frame.WIDTH, 448), color) for color in ("red", "blue")]
+    assert film.encode_mp4(film.find_ffmpeg(), pictures, 0.05)[4:8] == b"ftyp"
