@@ -12,6 +12,7 @@ from keras_pendulum.config.presets import preset
 from keras_pendulum.config.settings import parse_setting
 from keras_pendulum.environments.tasks import task_name
 from keras_pendulum.errors import ConfigError
+from keras_pendulum.study.arm_labels import describe_setting
 
 # The defects of `original` that these settings fix. The default study fixes them first.
 _FIXED_DEFECTS = {"updates_per_episode": "update-starvation", "target_update": "no-target-network"}
@@ -33,12 +34,18 @@ class Arm:
     config: Config
     baseline: str | None = None  # name of the arm that it is compared with
     has_curve: bool = True  # whether the figure shows its learning curve
+    label: str = ""  # in the figure; empty for its name
 
     @property
     def slug(self) -> str:
         """The name in file names."""
         slug = re.sub(r"[^a-z0-9_.=]+", "-", self.name.lower()).strip("-.") or "arm"
         return f"arm-{slug}" if _RESERVED.match(slug) else slug
+
+    @property
+    def shown_name(self) -> str:
+        """The name in the figure."""
+        return self.label or self.name
 
     @property
     def training_config(self) -> Config:
@@ -69,15 +76,21 @@ def default_arms() -> list[Arm]:
     for name in changed:
         value = getattr(reference, name)
         config = replace(arms[-1].config, **{name: value})
-        arms.append(Arm(f"+ {name}={value}", config, arms[-1].name, has_curve=False))
-    arms[-1] = replace(arms[-1], name="reference", has_curve=True)
+        label = f"+ {describe_setting(name, value)}"
+        arms.append(Arm(f"+ {name}={value}", config, arms[-1].name, False, label))
+    last = f"{arms[-1].label} = reference"
+    arms[-1] = replace(arms[-1], name="reference", has_curve=True, label=last)
     for name in changed:
         config = replace(reference, **{name: getattr(original, name)})
         defect = f" ({_FIXED_DEFECTS[name]})" if name in _FIXED_DEFECTS else ""
-        arms.append(Arm(f"reference without {name}{defect}", config, "reference"))
+        label = f"reference with {describe_setting(name, getattr(original, name))}"
+        name = f"reference without {name}{defect}"
+        arms.append(Arm(name, config, "reference", label=label))
     for defect, settings in _OTHER_DEFECTS.items():
         config = replace(reference, **settings)
-        arms.append(Arm(f"reference with {defect}", config, "reference"))
+        label = " and ".join(describe_setting(*item) for item in settings.items())
+        label = f"reference with {label}"
+        arms.append(Arm(f"reference with {defect}", config, "reference", label=label))
     return arms
 
 

@@ -9,6 +9,7 @@ import os
 import platform
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ from keras_pendulum.tensorflow_setup import fast_import, use_one_thread
 from keras_pendulum.version import __version__
 
 EPISODES_PER_POINT = 10  # of a learning curve
+_EVALUATIONS = 20  # of the greedy policy during a run, at most
 _DECIMALS = 6  # of a learning curve
 _EVALUATION_EPISODES = 100
 
@@ -43,6 +45,9 @@ class RunResult(NamedTuple):
     returns: list[float]  # greedy, from the same starts
     average_rewards: list[float]  # per step, while training; means over 10 episodes
     episode_returns: list[float]  # while training; means over 10 episodes
+    # Of the greedy policy after `evaluate_every` episodes, twice as many, … Empty in the results of
+    # older versions, which are valid without them.
+    greedy_regrets: list[float] = []  # noqa: RUF012
 
     @property
     def regret(self) -> float:
@@ -74,7 +79,12 @@ def train_and_score(job: Job) -> Reply:
         from keras_pendulum.evaluate.evaluation import evaluate_policy
         from keras_pendulum.train.train_dqn import train_dqn
     imported = time.perf_counter()
-    training = train_dqn(job.config)
+    clock = _EvaluationClock()
+    training = train_dqn(
+        replace(job.config, evaluate_every=evaluate_every(job.config)),
+        listeners=[clock.end],
+        on_phase=clock.begin,
+    )
     trained = time.perf_counter()
     score = evaluate_policy(training.network, _EVALUATION_EPISODES)
     evaluated = time.perf_counter()
@@ -83,10 +93,39 @@ def train_and_score(job: Job) -> Reply:
         returns=score.returns.tolist(),
         average_rewards=curve_points([record.average_reward for record in training.history]),
         episode_returns=curve_points([record.episode_return for record in training.history]),
+        greedy_regrets=[
+            round(record.greedy_regret, _DECIMALS)
+            for record in training.history
+            if not math.isnan(record.greedy_regret)
+        ],
     )
     data = encode(job, result)
     total = time.perf_counter() - started
-    return Reply(data, trained - imported, evaluated - trained, total, worker)
+    training_seconds = trained - imported - clock.seconds
+    evaluation_seconds = evaluated - trained + clock.seconds
+    return Reply(data, training_seconds, evaluation_seconds, total, worker)
+
+
+def evaluate_every(config: Config) -> int:
+    """Returns the number of episodes between two greedy evaluations of a study's run."""
+    return math.ceil(config.episodes / _EVALUATIONS)
+
+
+class _EvaluationClock:
+    """Hooks of `train_dqn` that sum the seconds of the evaluations during a run."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self._began: float | None = None
+
+    def begin(self, phase: str) -> None:
+        if phase == "evaluating":
+            self._began = time.perf_counter()
+
+    def end(self, record: object) -> None:
+        if self._began is not None:
+            self.seconds += time.perf_counter() - self._began
+            self._began = None
 
 
 def curve_points(values: list[float]) -> list[float]:
@@ -136,7 +175,8 @@ def decode(data: bytes, job: Job) -> RunResult | None:
             return None
         if {key: content[key] for key in settings} != settings:
             return None
-        result = RunResult(*(content[field] for field in RunResult._fields))
+        fields = {"greedy_regrets": [], **content}  # results of older versions have none
+        result = RunResult(*(fields[field] for field in RunResult._fields))
         valid = _is_possible(result, job.config) and content["regret"] == result.regret
         return result if valid else None
     except (ValueError, KeyError, TypeError, RecursionError):
@@ -148,18 +188,22 @@ def _is_possible(result: RunResult, config: Config) -> bool:
     task = TASKS[config.environment]
     low, high = (LOWEST_REWARD, 0.0) if task.has_torque else (0.0, 1.0)  # of a step's reward
     points = math.ceil(config.episodes / EPISODES_PER_POINT)
+    evaluations = config.episodes // evaluate_every(config)
+    largest_regret = task.steps_per_episode * (high - low)
+
+    def are_between(numbers: list[float], low: float, high: float) -> bool:
+        return all(isinstance(number, float) and low <= number <= high for number in numbers)
 
     def are_possible(numbers: list[float], count: int, steps: int) -> bool:
-        return len(numbers) == count and all(
-            isinstance(number, float) and steps * low <= number <= steps * high
-            for number in numbers
-        )
+        return len(numbers) == count and are_between(numbers, steps * low, steps * high)
 
     return (
         are_possible([result.optimal_mean_return], 1, task.steps_per_episode)
         and are_possible(result.returns, _EVALUATION_EPISODES, task.steps_per_episode)
         and are_possible(result.average_rewards, points, 1)
         and are_possible(result.episode_returns, points, config.max_episode_steps)
+        and len(result.greedy_regrets) in (0, evaluations)
+        and are_between(result.greedy_regrets, -largest_regret, largest_regret)
     )
 
 

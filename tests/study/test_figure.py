@@ -1,69 +1,101 @@
-"""The figure of a study: each arm has its own curve, and all labels are visible."""
+"""The figure of a study: each arm has its own curve, and all labels are legible."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
+from figure_texts import figure_of, require_legible
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from keras_pendulum.study.arms import own_arms
+from keras_pendulum.study.arms import Arm, default_arms, own_arms
 from keras_pendulum.study.figure import draw_study
 from keras_pendulum.study.job import RunResult
 from keras_pendulum.study.table import make_rows
 
 
-def panels(
-    presets: list[str], arms: list[str], monkeypatch: pytest.MonkeyPatch
-) -> dict[str, dict[str, Line2D]]:
-    """Returns the curves by task and arm; the n-th arm (from 0) has the values n and n + 0.5."""
-    shown: list[Axes] = []
-    monkeypatch.setattr(Figure, "savefig", lambda self, *args, **named: shown.extend(self.axes))
-    compared = own_arms(presets, arms)
-    results = {
-        arm.name: [RunResult(0.0, [-9.0], [n, n + 0.5], [n, n + 0.5])]
-        for n, arm in enumerate(compared)
-    }
-    draw_study(make_rows(compared, results), results)
+def drawn(arms: list[Arm], regrets: bool = True, seeds: int = 1) -> Figure:
+    """Returns the figure; the n-th arm (from 0) has the values n + 1 and n + 1.5."""
+    results = {}
+    for n, arm in enumerate(arms):
+        values = [n + 1, n + 1.5]
+        runs = [
+            RunResult(0.0, [-9.0 * 4**n - seed], values, values, values if regrets else [])
+            for seed in range(seeds)
+        ]
+        results[arm.name] = runs
+    return figure_of(lambda: draw_study(make_rows(arms, results), results))
+
+
+def panels(figure: Figure) -> dict[str, dict[str, Line2D]]:
+    """Returns the curves by task and arm."""
     return {
         axes.get_title().split(":")[0]: {str(line.get_label()): line for line in axes.lines}
-        for axes in shown[1:]
+        for axes in figure.axes[1:]
     }
 
 
-def test_each_arm_draws_its_own_curve(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn = panels(["reference", "original", "cartpole"], [], monkeypatch)
+@pytest.mark.parametrize("regrets", [True, False], ids=["regrets", "older results"])
+def test_each_arm_draws_its_own_curve(regrets: bool) -> None:
+    figure = drawn(own_arms(["reference", "original", "cartpole"], []), regrets)
     values = {
         task: {name: np.asarray(line.get_ydata()).tolist() for name, line in lines.items()}
-        for task, lines in drawn.items()
+        for task, lines in panels(figure).items()
     }
     assert values == {
-        "Pendulum-v1, g = 1": {"reference": [0, 0.5], "original": [1, 1.5]},
-        "CartPole-v1": {"cartpole": [2, 2.5]},
+        "Pendulum-v1, g = 1": {"reference": [1, 1.5], "original": [2, 2.5]},
+        "CartPole-v1": {"cartpole": [3, 3.5]},
     }
+    scales = ["log"] * 2 if regrets else ["linear"] * 2
+    assert [axes.get_yscale() for axes in figure.axes[1:]] == scales
+    names = [axes.get_ylabel() for axes in figure.axes[1:]]
+    if regrets:
+        assert all(name.startswith("Greedy regret") for name in names)
+        # The reference is evaluated after every 25 of its 500 episodes.
+        line = panels(figure)["Pendulum-v1, g = 1"]["reference"]
+        assert np.asarray(line.get_xdata()).tolist() == [25, 50]
+    else:
+        assert [name.split(",")[0] for name in names] == ["Reward per step", "Return (steps)"]
 
 
-def test_more_arms_than_colours_have_different_curves(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_arm_without_regrets_has_no_curve_beside_one_with_regrets() -> None:
+    arms = own_arms(["reference", "original"], [])
+    results = {
+        "reference": [RunResult(0.0, [-9.0], [1.0], [1.0], [2.0, 0.0])],
+        "original": [RunResult(0.0, [-9.0], [1.0], [1.0])],
+    }
+    figure = figure_of(lambda: draw_study(make_rows(arms, results), results))
+    assert list(panels(figure)["Pendulum-v1, g = 1"]) == ["reference"]
+    assert figure.axes[1].get_yscale() == "symlog"  # a logarithmic axis has no 0
+
+
+def test_more_arms_than_colours_have_different_curves() -> None:
     many = [f"arm{n}: reference" for n in range(12)]
-    drawn = panels([], [*many, "pole: cartpole"], monkeypatch)
-    assert [len(lines) for lines in drawn.values()] == [12, 1]
-    lines = [line for panel in drawn.values() for line in panel.values()]
+    figure = drawn(own_arms([], [*many, "pole: cartpole"]))
+    assert [len(lines) for lines in panels(figure).values()] == [12, 1]
+    lines = [line for panel in panels(figure).values() for line in panel.values()]
     assert len({(line.get_color(), line.get_marker()) for line in lines}) == 13
 
 
-def test_axis_labels_are_visible_beside_long_legends(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    many = [f"arm{n}: reference" for n in range(10)]
-    drawn = panels([], [*many, "pole: cartpole"], monkeypatch)
-    for lines in drawn.values():
-        axes = next(iter(lines.values())).axes
-        assert axes is not None
-        figure = axes.get_figure(root=True)
-        assert figure is not None
-        figure.draw_without_rendering()
-        name = axes.yaxis.label.get_window_extent()
-        assert 0 < name.y0 < name.y1 < figure.bbox.y1
+@pytest.mark.parametrize("seeds", [1, 3])
+@pytest.mark.parametrize(
+    "arms",
+    [
+        default_arms(),
+        own_arms(["reference"], []),
+        own_arms([], [*(f"arm{n}: reference" for n in range(10)), "pole: cartpole"]),
+        own_arms([], [f"{'a long name ' * 4}{n} $: reference" for n in range(3)]),
+    ],
+    ids=["default", "one", "eleven", "long names"],
+)
+def test_no_text_overlaps_another_or_leaves_the_figure(arms: list[Arm], seeds: int) -> None:
+    require_legible(drawn(arms, seeds=seeds))
+
+
+def test_default_arms_have_names_without_the_names_of_settings() -> None:
+    figure = drawn(default_arms())
+    names = [label.get_text().replace("\n", " ") for label in figure.axes[0].get_yticklabels()]
+    assert "reference with one update per episode" in names
+    assert "reference with no target network" in names
+    assert "reference with truncated indices" in names
+    assert not any("_" in name for name in names)

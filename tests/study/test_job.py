@@ -17,9 +17,11 @@ from keras_pendulum.study.job import (
     curve_points,
     decode,
     encode,
+    evaluate_every,
     installed_versions,
     train_and_score,
 )
+from keras_pendulum.train.train_dqn import train_dqn
 
 
 def test_cartpole_regret_is_the_difference_to_500_and_a_run_uses_one_thread(
@@ -66,6 +68,52 @@ POLE_RESULT = RunResult(500.0, [499.0] * 100, [1.0] * 2, [20.0] * 2)
 def test_numbers_at_the_limits_are_valid(changes: dict[str, Any]) -> None:
     result = PENDULUM_RESULT._replace(**changes)
     assert decode(encode(PENDULUM, result), PENDULUM) == result
+
+
+def test_run_has_a_greedy_regret_for_each_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(job_module, "use_one_thread", lambda: None)
+    monkeypatch.setattr(job_module, "_EVALUATIONS", 2)
+    job = Job("arm", "arm", preset("original", hidden_units=(8,), episodes=5), installed_versions())
+    reply = train_and_score(job)
+    result = decode(reply.result, job)
+    assert result is not None
+    trained = train_dqn(preset("original", hidden_units=(8,), episodes=5, evaluate_every=3))
+    assert result.greedy_regrets == [round(trained.history[2].greedy_regret, 6)]
+    assert reply.evaluation > 0
+    assert reply.training > 0
+
+
+@pytest.mark.parametrize(
+    ("episodes", "every"), [(1, 1), (20, 1), (21, 2), (500, 25), (1700, 85), (800, 40)]
+)
+def test_run_is_evaluated_at_most_20_times(episodes: int, every: int) -> None:
+    assert evaluate_every(preset("reference", episodes=episodes)) == every
+    assert episodes // every <= 20
+
+
+@pytest.mark.parametrize(
+    ("regrets", "valid"),
+    [
+        ([], True),  # a result of an older version
+        ([0.5] * 11, True),
+        ([-0.5, *[1000.0] * 10], True),
+        ([0.5] * 10, False),
+        ([math.nan] * 11, False),
+        ([-300 * LOWEST] * 11, False),
+        (["1"] * 11, False),
+    ],
+)
+def test_result_is_valid_with_all_its_greedy_regrets_or_none(
+    regrets: list[Any], valid: bool
+) -> None:
+    result = PENDULUM_RESULT._replace(greedy_regrets=regrets)
+    assert (decode(encode(PENDULUM, result), PENDULUM) == result) == valid
+
+
+def test_result_of_an_older_version_is_read() -> None:
+    content = json.loads(encode(PENDULUM, PENDULUM_RESULT))["result"]
+    del content["greedy_regrets"]
+    assert decode(job_module._with_checksum(content), PENDULUM) == PENDULUM_RESULT
 
 
 def test_result_has_no_settings_of_evaluations_during_the_run() -> None:
