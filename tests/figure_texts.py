@@ -10,6 +10,7 @@ from unittest import mock
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -42,6 +43,10 @@ def require_legible(figure: Figure) -> None:
         for axes in figure.axes:
             if text.axes is not axes:
                 assert not _overlap(box, axes.bbox), f"{content!r} is on another panel"
+    for legend in figure.findobj(Legend):
+        box = legend.get_window_extent()
+        assert box.x0 >= 0 and box.x1 <= figure.bbox.x1, "a legend leaves the figure"
+        assert box.y0 >= 0 and box.y1 <= figure.bbox.y1, "a legend leaves the figure"
     for (one, first), (other, second) in itertools.combinations(boxes, 2):
         assert not _overlap(first, second), (one.get_text(), other.get_text())
 

@@ -74,8 +74,8 @@ def draw_curve(
     draw_episode_axis(axes, len(values))
     # The legend is above the axes, where it hides no episode.
     axes.legend(
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1),
+        loc="lower left",
+        bbox_to_anchor=(0, 1),
         ncols=3,
         frameon=False,
         fontsize="small",

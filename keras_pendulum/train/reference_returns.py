@@ -5,22 +5,35 @@ from __future__ import annotations
 import math
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.environments.tasks import task_name
+from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, task_name
 from keras_pendulum.evaluate.evaluation import Score, optimal_training_return, random_return
+from keras_pendulum.optimum.discounted import discounted_return
+from keras_pendulum.optimum.optimal_return import USUAL_SEEDS
 from keras_pendulum.train.learning_curve import OPTIMUM, RANDOM
 from keras_pendulum.version import __version__
+
+_VISIBLE = 0.05  # of a return; smaller differences are within the accuracy of both
 
 
 def reference_returns(config: Config) -> dict[str, float]:
     """Returns the mean returns of a training episode by name; none for a pendulum beyond 200 steps.
 
-    The names are `best possible` and `random actions`.
+    The names are `best possible` and `random actions`. A pendulum's episode of 200 steps has one
+    more where it differs from the best possible: the return of the optimal policy for the discount.
     """
     optimum = optimal_training_return(config)
     if math.isnan(optimum):
         return {}
     random = random_return(config.environment, config.gravity, config.max_episode_steps)
-    return {OPTIMUM: optimum, RANDOM: random}
+    return {OPTIMUM: optimum, **_discounted(config, optimum), RANDOM: random}
+
+
+def _discounted(config: Config, optimum: float) -> dict[str, float]:
+    if config.gravity is None or config.max_episode_steps != STEPS_PER_EPISODE:
+        return {}
+    mean = float(discounted_return(config.gravity, config.discount, USUAL_SEEDS).mean())
+    name = f"optimal policy for γ = {config.discount:g}"
+    return {name: mean} if optimum - mean > _VISIBLE else {}
 
 
 def run_title(config: Config, score: Score | None = None) -> str:

@@ -118,7 +118,7 @@ def make_grid(figure: Figure, rows: int, columns: int, top: float) -> GridSpec:
         right=1 - 0.25 / width,
         bottom=0.65 / height,
         top=1 - top / height,
-        wspace=0.32,
+        wspace=0.38,
         hspace=_BETWEEN / _ROW,
     )
 

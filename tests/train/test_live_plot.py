@@ -45,7 +45,7 @@ def test_window_shows_the_curve_and_each_new_episode(window: live_plot.LivePlot)
 @pytest.mark.parametrize(
     ("preset", "panels", "quantity", "lines"),
     [
-        ("reference", 2, "Reward per step", 4),
+        ("reference", 2, "Reward per step", 5),
         ("cartpole", 2, "Return (steps)", 4),
         ("cartpole-original", 1, "Duration (steps)", 2),
     ],
