@@ -23,11 +23,15 @@ from keras_pendulum.config.settings import validate_setting
 from keras_pendulum.display import require_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
+from keras_pendulum.storage.find_weights import find_weights
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from keras_pendulum.play.episode import Policy
+    from keras_pendulum.play.window import Window
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.play") -> int:
@@ -62,50 +66,63 @@ def _play(arguments: argparse.Namespace) -> int:
         gravity = validate_setting("gravity", gravity)
     if seed is not None:
         seed = validate_setting("seed", seed)
+    file = find_weights(arguments.against) if arguments.against is not None else None
     require_display()
-    agent = None
-    if arguments.against is not None:
-        agent, gravity = _load_agent(arguments.against, gravity, arguments.activation)
-    elif gravity is None:
-        gravity = Config.gravity
-    return _run_game(gravity, seed, agent, arguments.print_steps)
+    from keras_pendulum.play.window import Window
+
+    with ControlC() as control_c:
+        window = Window()
+        try:
+            agent = None
+            if file is not None:
+                window.show_loading(f"Loading the policy of {file.name} …")
+                agent, gravity = _load_agent(file, gravity, arguments.activation)
+            elif gravity is None:
+                gravity = Config.gravity
+            assert gravity is not None  # only CartPole has none
+            return _run_game(window, control_c, gravity, seed, agent, arguments.print_steps)
+        finally:
+            window.close()
 
 
-def _load_agent(
-    weights: str, gravity: float | None, activation: str | None
-) -> tuple[Policy, float]:
+def _load_agent(file: Path, gravity: float | None, activation: str | None) -> tuple[Policy, float]:
     """Returns the greedy policy of a weights file, and the gravity to play at (m/s²)."""
     require_tensorflow()
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluation_gravity
         from keras_pendulum.evaluate.loaded_policy import load_policy
-        from keras_pendulum.storage.find_weights import find_weights
 
-    path = find_weights(weights)
-    policy = load_policy(path, activation)
+    policy = load_policy(file, activation)
     provenance = policy.provenance
     if not TASKS[provenance.environment].has_torque:
-        raise UserError(f"{path}: belongs to {provenance.environment}; expected Pendulum-v1")
+        raise UserError(f"{file}: belongs to {provenance.environment}; expected Pendulum-v1")
     gravity = evaluation_gravity(provenance, gravity)
     assert gravity is not None  # only CartPole has none
     return lambda observation: float(policy(observation)[0]), gravity
 
 
-def _run_game(gravity: float, seed: int | None, agent: Policy | None, print_steps: bool) -> int:
+def _run_game(
+    window: Window,
+    control_c: ControlC,
+    gravity: float,
+    seed: int | None,
+    agent: Policy | None,
+    print_steps: bool,
+) -> int:
     from keras_pendulum.optimum.optimal_return import USUAL_SEEDS
     from keras_pendulum.play.game import Game
-    from keras_pendulum.play.window import Window, play
+    from keras_pendulum.play.window import play
 
     if seed is None:
         # The optimal returns of these seeds are shipped, or cached after their first use.
         seed = random.choice(USUAL_SEEDS)
+    window.show_loading(f"Loading the best possible returns at g = {gravity:g} m/s² …")
     print_line = functools.partial(print, flush=True)
     game = Game(gravity, seed, agent, print_line=print_line, print_steps=print_steps)
     try:
-        with ControlC() as control_c:
-            play(game, Window(), control_c.check)
+        play(game, window, control_c.check)
     finally:
-        game.close()  # closes the window too
+        game.close()
     return 0
 
 

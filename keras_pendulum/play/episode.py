@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.actions import require_torque
+
+if TYPE_CHECKING:
+    import gymnasium
 
 Policy = Callable[[NDArray[np.float32]], float]  # observation [3] -> torque in N·m
 
@@ -25,6 +28,13 @@ class ManualEpisode:
         self.reward = 0.0  # of the last step
         self.total_reward = 0.0  # the undiscounted return so far
         self.done = False
+        self.path = [self.state]  # of the phase plane, from the start on
+
+    @property
+    def state(self) -> tuple[float, float]:
+        """The angle θ in rad, -π to π and 0 upright, and the speed θ̇ in rad/s."""
+        cosine, sine, speed = map(float, self.observation)
+        return math.atan2(sine, cosine), speed
 
     def step(self, torque: float) -> None:
         """Takes one step. Raises ValueError for a torque that is not finite or outside ±2 N·m."""
@@ -34,6 +44,7 @@ class ManualEpisode:
         self.torque, self.reward = torque, float(reward)
         self.total_reward += self.reward
         self.steps += 1
+        self.path.append(self.state)
         self.done = terminated or truncated
 
     def __str__(self) -> str:

@@ -6,13 +6,9 @@ frame, and draws its `view`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from keras_pendulum.environments.actions import MAX_TORQUE
 from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environment
@@ -51,7 +47,8 @@ class View:
     optimal_return: float
     message: str  # over the picture; empty while the pendulum moves
     key_help: str
-    pixels: NDArray[np.uint8]  # [500, 500, 3], Gymnasium's picture
+    path: Sequence[tuple[float, float]]  # θ (rad) and θ̇ (rad/s) so far; the last one is present
+    earlier_path: Sequence[tuple[float, float]]  # the player's, while the agent drives
 
 
 class _Stage(Enum):
@@ -102,7 +99,7 @@ class Game:
     ) -> None:
         self._gravity, self._agent, self._print_line = gravity, agent, print_line
         self._print_steps = print_steps
-        self._env = make_environment("Pendulum-v1", gravity, render_mode="rgb_array")
+        self._env = make_environment("Pendulum-v1", gravity)
         self.finished = False
         self._stage = _Stage.READY
         self._start(seed)
@@ -140,7 +137,6 @@ class Game:
     def view(self) -> View:
         """Returns the content of the present frame."""
         message = {_Stage.READY: "Get ready!", _Stage.SCORE: self._score()}.get(self._stage, "")
-        pixels: Any = self._env.render()
         episode = self._episode
         return View(
             title=_TITLES[self._stage],
@@ -153,11 +149,12 @@ class Game:
             optimal_return=self._optimal_return,
             message=message,
             key_help=_KEY_HELP[self._stage],
-            pixels=pixels,
+            path=episode.path,
+            earlier_path=() if episode is self._player else self._player.path,
         )
 
     def close(self) -> None:
-        """Closes the environment; Gymnasium then closes all windows of pygame."""
+        """Closes the environment."""
         self._env.close()
 
     def _start(self, seed: int) -> None:

@@ -10,7 +10,19 @@ import pygame
 from keras_pendulum.environments.actions import MAX_TORQUE
 from keras_pendulum.environments.tasks import STEPS_PER_EPISODE
 from keras_pendulum.errors import UserError
+from keras_pendulum.play.drawing import (
+    INK,
+    LARGE,
+    LINE,
+    PALE_INK,
+    PAPER,
+    WHITE,
+    Writer,
+    draw_pendulum,
+    draw_portrait,
+)
 from keras_pendulum.play.game import FRAMES_PER_SECOND, Game, Key, View
+from keras_pendulum.torque_colors import rgb, torque_color
 
 KEYS = {
     pygame.K_j: Key.CLOCKWISE,
@@ -27,16 +39,11 @@ KEYS = {
     pygame.K_ESCAPE: Key.LEAVE,
 }
 
-_SIZE = _WIDTH, _HEIGHT = 600, 700
-_MIDDLE = pygame.Rect(70, 70, 360, 360)  # of Gymnasium's picture; the margin is always empty
-_SIDE = 500  # of the middle, enlarged
-_TOP = 44  # height of the title
-_BAR = pygame.Rect(190, _TOP + _SIDE + 14, 220, 20)  # the torque
-
-_INK, _PALE_INK, _PAPER = (25, 25, 25), (90, 90, 90), (236, 238, 241)
-_WHITE, _LINE = (255, 255, 255), (175, 180, 186)
-# Distinct for colour-blind people too (Okabe & Ito 2008).
-_CLOCKWISE, _COUNTERCLOCKWISE = (0, 114, 178), (213, 94, 0)
+_SIZE = _WIDTH, _HEIGHT = 1000, 640
+_TOP = 48  # height of the title
+_SIDE = 456  # of the pendulum, and of the phase portrait beside it
+_LEFT, _RIGHT = pygame.Rect(0, _TOP, 500, _SIDE), pygame.Rect(500, _TOP, 500, _SIDE)
+_BAR = pygame.Rect(110, _TOP + _SIDE + 16, 280, 18)  # the torque, below the pendulum
 
 
 class Window:
@@ -60,8 +67,7 @@ class Window:
             raise UserError(f"cannot open a window: {error}") from error
         pygame.display.set_caption("keras_pendulum: play")
         pygame.key.stop_text_input()  # an input method would take the letters
-        pygame.font.init()
-        self._small, self._large = pygame.font.Font(None, 48), pygame.font.Font(None, 64)
+        self._write = Writer(self._screen).write
 
     def pressed_keys(self) -> list[Key]:
         """Returns the keys pressed since the last call; a closed window counts as LEAVE."""
@@ -73,46 +79,51 @@ class Window:
                 keys.append(KEYS[event.key])
         return keys
 
+    def show_loading(self, text: str) -> None:
+        """Draws a line of text."""
+        self._screen.fill(PAPER)
+        self._write(text, (_WIDTH // 2, _HEIGHT // 2 - 12), LARGE, align=0.5)
+        pygame.event.pump()
+        pygame.display.flip()
+
+    def close(self) -> None:
+        """Closes the window."""
+        pygame.display.quit()
+
     def show(self, view: View) -> None:
         """Draws a view and waits until the next frame is due."""
-        self._screen.fill(_PAPER)
-        self._write(view.title, (14, 11), self._large)
-        start = f"g = {view.gravity:g} m/s²     seed {view.seed}"
-        self._write(start, (_WIDTH - 14, 15), align=1.0)
-        self._draw_pendulum(view)
+        self._screen.fill(PAPER)
+        self._write(view.title, (16, 13), LARGE)
+        start = f"g = {view.gravity:g} m/s²      start of seed {view.seed}"
+        self._write(start, (_WIDTH - 16, 16), align=1.0)
+        angle, _ = view.path[-1]
+        pygame.draw.rect(self._screen, WHITE, (0, _TOP, _WIDTH, _SIDE))
+        self._screen.blit(draw_pendulum(angle, view.torque, _LEFT.size), _LEFT)
+        draw_portrait(self._screen, self._write, _RIGHT, view.path, view.earlier_path)
+        # A strip along the lower edge shows the elapsed share of the episode.
+        width = _WIDTH * view.step // STEPS_PER_EPISODE
+        pygame.draw.rect(self._screen, LINE, (0, _TOP + _SIDE - 4, width, 4))
+        if view.message:
+            self._write(view.message, (_LEFT.centerx, _TOP + 6), align=0.5)
         self._draw_torque(view.torque)
         self._draw_numbers(view)
-        self._write(
-            "j or Left  -2 N·m     k or Down  0     l or Right  +2 N·m",
-            (_WIDTH // 2, _HEIGHT - 52),
-            align=0.5,
-        )
-        self._write(view.key_help, (_WIDTH // 2, _HEIGHT - 27), align=0.5)
+        keys = "j or Left: -2 N·m      k or Down: 0      l or Right: +2 N·m"
+        self._write(keys, (16, _HEIGHT - 30))
+        self._write(view.key_help, (_WIDTH - 16, _HEIGHT - 30), align=1.0)
         pygame.display.flip()
         self._wait_for_frame()
 
-    def _draw_pendulum(self, view: View) -> None:
-        picture = pygame.surfarray.make_surface(view.pixels.swapaxes(0, 1))
-        picture = pygame.transform.smoothscale(picture.subsurface(_MIDDLE), (_SIDE, _SIDE))
-        pygame.draw.rect(self._screen, _WHITE, (0, _TOP, _WIDTH, _SIDE))
-        self._screen.blit(picture, ((_WIDTH - _SIDE) // 2, _TOP))
-        # A strip along the lower edge shows the elapsed share of the episode.
-        width = _WIDTH * view.step // STEPS_PER_EPISODE
-        pygame.draw.rect(self._screen, _LINE, (0, _TOP + _SIDE - 4, width, 4))
-        if view.message:
-            self._write(view.message, (_WIDTH // 2, _TOP + 24), self._large, align=0.5)
-
     def _draw_torque(self, torque: float) -> None:
         """Draws a bar from the middle; a counterclockwise torque points to the right."""
-        pygame.draw.rect(self._screen, _WHITE, _BAR)
+        pygame.draw.rect(self._screen, WHITE, _BAR)
         length = round(abs(torque) / MAX_TORQUE * _BAR.width / 2)
         left = _BAR.centerx - (length if torque < 0 else 0)
-        colour = _CLOCKWISE if torque < 0 else _COUNTERCLOCKWISE
-        pygame.draw.rect(self._screen, colour, (left, _BAR.top, length, _BAR.height))
-        pygame.draw.rect(self._screen, _LINE, _BAR, width=1)
-        pygame.draw.line(self._screen, _INK, _BAR.midtop, _BAR.midbottom, width=2)
-        self._write("clockwise", (_BAR.left - 10, _BAR.top + 2), align=1.0, colour=_CLOCKWISE)
-        self._write("counterclockwise", (_BAR.right + 10, _BAR.top + 2), colour=_COUNTERCLOCKWISE)
+        place = (left, _BAR.top, length, _BAR.height)
+        pygame.draw.rect(self._screen, rgb(torque_color(torque)), place)
+        pygame.draw.rect(self._screen, LINE, _BAR, width=1)
+        pygame.draw.line(self._screen, INK, _BAR.midtop, _BAR.midbottom, width=2)
+        self._write("clockwise", (_BAR.left - 10, _BAR.top), align=1.0)
+        self._write("counterclockwise", (_BAR.right + 10, _BAR.top))
 
     def _draw_numbers(self, view: View) -> None:
         numbers = {
@@ -125,24 +136,8 @@ class Window:
         width = _WIDTH / len(numbers)
         for i, (name, text) in enumerate(numbers.items()):
             middle = round((i + 0.5) * width)
-            self._write(name, (middle, _BAR.bottom + 14), align=0.5, colour=_PALE_INK)
-            self._write(text, (middle, _BAR.bottom + 33), self._large, align=0.5)
-
-    def _write(
-        self,
-        text: str,
-        place: tuple[int, int],
-        font: pygame.font.Font | None = None,
-        *,
-        align: float = 0.0,
-        colour: tuple[int, int, int] = _INK,
-    ) -> None:
-        """Writes text below `place`; `align` is the share of its width to the left of `place`."""
-        # Scaled from double size, because pygame places letters at whole pixels, unevenly.
-        drawn = pygame.transform.smoothscale_by(
-            (font or self._small).render(text, True, colour), 0.5
-        )
-        self._screen.blit(drawn, (place[0] - round(align * drawn.get_width()), place[1]))
+            self._write(name, (middle, _BAR.bottom + 16), align=0.5, color=PALE_INK)
+            self._write(text, (middle, _BAR.bottom + 35), LARGE, align=0.5)
 
 
 def play(game: Game, window: Window, check_interrupt: Callable[[], None]) -> None:

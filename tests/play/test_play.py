@@ -25,10 +25,13 @@ from keras_pendulum.cli import ControlC
 from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environment
 from keras_pendulum.evaluate import __main__ as evaluate_command
 from keras_pendulum.play import __main__ as play_command
+from keras_pendulum.play import drawing
 from keras_pendulum.play import window as window_module
+from keras_pendulum.play.drawing import INK, SMALL, Writer, draw_pendulum, draw_portrait
 from keras_pendulum.play.episode import ManualEpisode, Policy
 from keras_pendulum.play.game import READY_FRAMES, Game, Key
 from keras_pendulum.play.window import Window, play
+from keras_pendulum.torque_colors import CLOCKWISE, COUNTERCLOCKWISE, rgb
 
 NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
 CLOSED = "error: the window was closed before the end of the last episode\n"
@@ -42,7 +45,7 @@ class Player:
     keys: Mapping[int, Any]  # frame -> a key of pygame, pygame.QUIT, or a list of them
     lines: list[str] = field(default_factory=list)
     frames: int = 0
-    pixels: dict[int, Any] = field(default_factory=dict)  # by frame [600, 700, 3]
+    pixels: dict[int, Any] = field(default_factory=dict)  # by frame [1000, 640, 3]
 
     def end_frame(self) -> None:
         self.frames += 1
@@ -186,27 +189,128 @@ def test_after_the_score_r_repeats_the_start_and_enter_plays_the_next(no_window:
 
 def test_window_shows_torque_pendulum_and_numbers(no_window: None) -> None:
     player = play_game({1: pygame.K_l, 10: pygame.K_j, 20: pygame.K_j, 21: pygame.K_ESCAPE})
-    assert player.pixels[1].shape == (600, 700, 3)
+    assert player.pixels[1].shape == (1000, 640, 3)
     bar = window_module._BAR
     right, left = (bar.centerx + 50, bar.centery), (bar.centerx - 50, bar.centery)
     frames = player.pixels.values()
     colours = [[tuple(pixels[point]) for point in (left, right)] for pixels in frames]
-    empty, blue = window_module._WHITE, window_module._CLOCKWISE
-    red = window_module._COUNTERCLOCKWISE
+    empty, blue = drawing.WHITE, rgb(CLOCKWISE)
+    red = rgb(COUNTERCLOCKWISE)
     assert colours == [[empty, empty], [empty, red], [blue, empty], [blue, empty]]
-    for band in ((0, 40), (60, 540), (600, 650)):  # title, pendulum, numbers
+    for band in ((0, 40), (60, 480), (560, 605)):  # title, pendulum, numbers
         rows = slice(*band)
         changed = (player.pixels[20][:, rows] != player.pixels[21][:, rows]).any()
         assert changed == (band[0] > 0)
+
+
+@pytest.mark.parametrize("with_agent", [True, False])
+def test_no_text_overlaps_another_or_leaves_the_window(
+    with_agent: bool, no_window: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    boxes: list[pygame.Rect] = []
+    write = Writer.write
+
+    def record(
+        self: Writer, text: str, place: tuple[int, int], *options: Any, **named: Any
+    ) -> None:
+        write(self, text, place, *options, **named)
+        drawn = self._render(text, (*options, SMALL)[0], named.get("color", INK))
+        left = place[0] - round(named.get("align", 0.0) * drawn.get_width())
+        boxes.append(drawn.get_rect(topleft=(left, place[1])))
+
+    monkeypatch.setattr(Writer, "write", record)
+    frame = 0
+
+    def check() -> None:
+        nonlocal frame
+        frame += 1
+        screen = pygame.display.get_surface()
+        assert screen is not None
+        for i, box in enumerate(boxes):
+            assert screen.get_rect().contains(box), box
+            # Each line has some empty pixels above and below its letters.
+            assert box.inflate(0, -6).collidelist([b.inflate(0, -6) for b in boxes[:i]]) == -1
+        boxes.clear()
+        pressed = (
+            {1: pygame.K_RETURN, 405: pygame.K_ESCAPE}
+            if with_agent
+            else {1: pygame.K_l, 205: pygame.K_ESCAPE}
+        )
+        if frame in pressed:
+            pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=pressed[frame]))
+
+    agent = (lambda observation: -2.0) if with_agent else None
+    game = Game(10.0 if with_agent else 1.0, 999, agent, print_line=lambda line: None)
+    play(game, Window(check), lambda: None)
+    assert frame == (405 if with_agent else 205)
+
+
+def test_portrait_shows_the_path_and_that_of_the_player(no_window: None) -> None:
+    start, lines = (1.0, 0.0), [(1.0, 0.0), (0.5, 4.0), (-0.5, 4.0)]
+    pictures = []
+    for path, earlier in (([start], []), (lines, []), ([start], lines)):
+        window = Window(lambda: None)
+        screen = pygame.display.get_surface()
+        assert screen is not None
+        screen.fill((255, 255, 255))
+        draw_portrait(screen, Writer(screen).write, window_module._RIGHT, path, earlier)
+        pictures.append(pygame.surfarray.array3d(screen)[700:800, 140:220].astype(int))
+        window.close()
+    darkest = [int(picture.sum(axis=2).min()) for picture in pictures]
+    assert darkest[1] < darkest[2] < darkest[0]
+
+
+def test_path_does_not_cross_the_portrait_where_the_angle_jumps(no_window: None) -> None:
+    pictures = []
+    for path in ([(3.1, 2.0)], [(-3.1, 2.0), (3.1, 2.0)]):
+        window = Window(lambda: None)
+        screen = pygame.display.get_surface()
+        assert screen is not None
+        screen.fill((255, 255, 255))
+        draw_portrait(screen, Writer(screen).write, window_module._RIGHT, path, [])
+        pictures.append(pygame.surfarray.array3d(screen))
+        window.close()
+    assert (pictures[0] == pictures[1]).all()
+
+
+@pytest.mark.parametrize(("angle", "side"), [(0.5 * np.pi, "left"), (-0.5 * np.pi, "right")])
+def test_pendulum_is_drawn_counterclockwise_from_upright(angle: float, side: str) -> None:
+    pixels = pygame.surfarray.array3d(draw_pendulum(angle, 0.0, (500, 456)))
+    rod = (abs(pixels.astype(int) - drawing._ROD).sum(axis=2) < 30).sum(axis=1)
+    assert (rod[:250].sum() > 3 * rod[250:].sum()) == (side == "left")
+
+
+def test_window_says_that_it_loads_before_the_policy_is_loaded(
+    no_window: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    write = Writer.write
+
+    def record(self: Writer, text: str, *options: Any, **named: Any) -> None:
+        shown.append(text)
+        write(self, text, *options, **named)
+
+    def load(file: Path, gravity: float | None, activation: str | None) -> Any:
+        assert shown == ["Loading the policy of reference.h5 …"]
+        screen = pygame.display.get_surface()
+        assert screen is not None
+        assert len(np.unique(pygame.surfarray.array3d(screen).reshape(-1, 3), axis=0)) > 5
+        raise kp.UserError("enough")
+
+    monkeypatch.setattr(Writer, "write", record)
+    monkeypatch.setattr(play_command, "_load_agent", load)
+    assert play_command.main(["--against", "reference"]) == 2
+    assert len(shown) == 1
+    assert not pygame.display.get_init()  # the window is closed
 
 
 def test_strip_along_the_lower_edge_grows_with_the_episode(no_window: None) -> None:
     player = play_game({1: pygame.K_l, 101: pygame.K_j, 201: pygame.K_ESCAPE})
     row = window_module._TOP + window_module._SIDE - 2
     rows = [pixels[:, row] for pixels in player.pixels.values()]
-    strips = [(row_pixels == window_module._LINE).all(axis=-1) for row_pixels in rows]
-    assert [int(strip.sum()) for strip in strips] == [0, 300, 600]
-    assert strips[1][:300].all()
+    strips = [(row_pixels == drawing.LINE).all(axis=-1) for row_pixels in rows]
+    assert [int(strip.sum()) for strip in strips] == [0, 500, 1000]
+    assert strips[1][:500].all()
 
 
 @pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 40.0])
@@ -222,7 +326,7 @@ def test_invalid_torque_is_refused_before_the_environment(torque: float) -> None
 
 @pytest.fixture(scope="module")
 def agent() -> Policy:
-    return play_command._load_agent("reference", None, None)[0]
+    return play_command._load_agent(kp.find_weights("reference"), None, None)[0]
 
 
 def test_agent_drives_the_same_start_and_three_returns_are_printed(
@@ -263,7 +367,14 @@ def game_settings(monkeypatch: pytest.MonkeyPatch, no_window: None) -> dict[str,
     """The settings of the game that the command would run."""
     settings: dict[str, Any] = {}
 
-    def record(gravity: float, seed: int | None, agent: Any, print_steps: bool) -> int:
+    def record(
+        window: object,
+        control_c: object,
+        gravity: float,
+        seed: int | None,
+        agent: Any,
+        print_steps: bool,
+    ) -> int:
         settings.update(gravity=gravity, seed=seed, agent=agent, print_steps=print_steps)
         return 0
 
@@ -360,7 +471,7 @@ class Screen:
         self._server = subprocess.Popen(
             # Without -noreset the server restarts when its last client ends, and refuses clients
             # meanwhile.
-            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x800x24", "-noreset"],
+            ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x800x24", "-noreset"],
             pass_fds=[writing],
             stderr=subprocess.DEVNULL,
         )
