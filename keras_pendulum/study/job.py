@@ -21,7 +21,7 @@ from keras_pendulum.tensorflow_setup import fast_import, use_one_thread
 from keras_pendulum.version import __version__
 
 EPISODES_PER_POINT = 10  # of a learning curve
-_EVALUATIONS = 20  # of the greedy policy during a run, at most
+_EVALUATIONS = 10  # of the greedy policy during a run, at most
 _DECIMALS = 6  # of a learning curve
 _EVALUATION_EPISODES = 100
 

@@ -51,9 +51,9 @@ def test_each_arm_draws_its_own_curve(regrets: bool) -> None:
     names = [axes.get_ylabel() for axes in figure.axes[1:]]
     if regrets:
         assert all(name.startswith("Greedy regret") for name in names)
-        # The reference is evaluated after every 25 of its 500 episodes.
+        # The reference is evaluated after every 50 of its 500 episodes.
         line = panels(figure)["Pendulum-v1, g = 1"]["reference"]
-        assert np.asarray(line.get_xdata()).tolist() == [25, 50]
+        assert np.asarray(line.get_xdata()).tolist() == [50, 100]
     else:
         assert [name.split(",")[0] for name in names] == ["Reward per step", "Return (steps)"]
 
