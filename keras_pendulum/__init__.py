@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
     from keras_pendulum.evaluate.evaluation import Score, evaluate_policy
     from keras_pendulum.evaluate.loaded_policy import Policy, load_policy
+    from keras_pendulum.evaluate.q_functions import q_function
     from keras_pendulum.optimum.optimal_return import optimal_return
     from keras_pendulum.storage.find_weights import find_weights
     from keras_pendulum.storage.weights import load_weights, save_weights
@@ -44,6 +45,7 @@ __all__ = [
     "load_weights",
     "optimal_return",
     "preset",
+    "q_function",
     "save_weights",
     "train_dqn",
 ]
@@ -55,6 +57,7 @@ _MODULES = {
     "errors": ("ConfigError", "UserError", "WeightsError"),
     "evaluate.evaluation": ("Score", "evaluate_policy"),
     "evaluate.loaded_policy": ("Policy", "load_policy"),
+    "evaluate.q_functions": ("q_function",),
     "optimum.optimal_return": ("optimal_return",),
     "storage.find_weights": ("find_weights",),
     "storage.weights": ("load_weights", "save_weights"),

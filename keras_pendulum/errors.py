@@ -20,6 +20,10 @@ class WeightsError(UserError, ValueError):
     """A weights file that cannot be read, or does not hold the expected network."""
 
 
+class UnknownLayersError(WeightsError):
+    """A whole model that is no chain of Dense layers."""
+
+
 def require_type(name: str, value: object, expected: type | tuple[type, ...]) -> None:
     """Raises TypeError when the argument `name` has another type than expected."""
     if not isinstance(value, expected):

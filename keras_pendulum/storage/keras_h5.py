@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.dqn.network import REGISTERED_NAME
-from keras_pendulum.errors import WeightsError
+from keras_pendulum.errors import UnknownLayersError, WeightsError
 from keras_pendulum.storage.layer_order import StoredLayer, call_order
 from keras_pendulum.storage.model_config import dense_layers
 from keras_pendulum.storage.quarantine import H5File
@@ -151,7 +151,7 @@ def _keras3_layers(file: H5File, path: str) -> list[StoredLayer]:
             _require_no_effect(path, name, kind)
             continue
         if containers[-1:] == ["layers"] and _without_number(kind) != "dense":
-            raise WeightsError(f"{path}: layer {name} is a {kind}; expected Dense layers")
+            raise UnknownLayersError(f"{path}: layer {name} is a {kind}; expected Dense layers")
         ordered = _without_number(key) == "dense" and _is_ordered(file, containers)
         group = "/".join(parents)
         layers.append(

@@ -9,7 +9,7 @@ import json
 from typing import Any, NamedTuple, NoReturn
 
 from keras_pendulum.dqn.policy import ACTIVATIONS
-from keras_pendulum.errors import WeightsError
+from keras_pendulum.errors import UnknownLayersError, WeightsError
 
 _KINDS = ("InputLayer", "Flatten", "Dense", "Activation", "Dropout")
 _EXPECTED = "expected a chain of Dense layers (with Activation and Dropout layers)"
@@ -44,7 +44,7 @@ def dense_layers(model: dict[str, Any], path: str) -> list[DenseLayer] | None:
     kind, config = model["class_name"], model["config"]
     if kind not in ("Sequential", "Functional", "Model"):
         if "layers" in config:
-            raise WeightsError(
+            raise UnknownLayersError(
                 f"{path}: the model is a {kind}, which may call its layers otherwise"
             )
         return None
@@ -68,7 +68,7 @@ def dense_layers(model: dict[str, Any], path: str) -> list[DenseLayer] | None:
                 _refuse(path, name, f"applies {activation} to what is no output of a linear layer")
             chain[-1] = chain[-1]._replace(activation=activation)
     if not chain:
-        raise WeightsError(f"{path}: the model has no Dense layer; {_EXPECTED}")
+        raise UnknownLayersError(f"{path}: the model has no Dense layer; {_EXPECTED}")
     if chain[-1].activation != "linear":
         _refuse(path, last_activated, f"applies {chain[-1].activation} to the Q-values")
     return chain
@@ -150,4 +150,4 @@ def _names(tensors: Any) -> list[str]:
 
 
 def _refuse(path: str, name: str, found: str) -> NoReturn:
-    raise WeightsError(f"{path}: layer {name} {found}; {_EXPECTED}")
+    raise UnknownLayersError(f"{path}: layer {name} {found}; {_EXPECTED}")

@@ -1,0 +1,378 @@
+"""Every kind of agent, in the one form that an evaluation uses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import keras
+import numpy as np
+import pytest
+import tensorflow as tf
+import torch
+from numpy.typing import NDArray
+
+import keras_pendulum as kp
+from keras_pendulum.dqn.network import Provenance
+from keras_pendulum.evaluate.agents import Agent, as_agent, recorded_discount
+from keras_pendulum.evaluate.answers import ActionError
+
+OBSERVATIONS = np.random.default_rng(0).uniform(-1, 1, (9, 3)).astype(np.float32)
+GRID = np.linspace(-2, 2, 5)
+
+
+@pytest.fixture(scope="module")
+def network() -> kp.DQN:
+    return kp.DQN((8, 6), 5, seed=3)
+
+
+def dense_chain(network: kp.DQN) -> keras.Model:
+    """Returns the network as a Sequential model of Keras."""
+    layers = [keras.layers.Dense(units, "tanh") for units in network.hidden_units]
+    model = keras.Sequential(
+        [keras.Input((3,)), *layers, keras.layers.Dense(network.action_count)], name="mine"
+    )
+    model.set_weights(network.get_weights())
+    return model
+
+
+@keras.saving.register_keras_serializable("tests")
+class Subclassed(keras.Model):
+    """The same layers, called by a model's own code."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.parts = [keras.layers.Dense(n, "tanh") for n in (8, 6)] + [keras.layers.Dense(5)]
+
+    def call(self, x: Any) -> Any:
+        for part in self.parts:
+            x = part(x)
+        return x
+
+
+def subclassed(network: kp.DQN) -> keras.Model:
+    model = Subclassed(name="mine")
+    model(OBSERVATIONS)
+    model.set_weights(network.get_weights())
+    return model
+
+
+def torch_module(network: kp.DQN) -> torch.nn.Module:
+    weights = [torch.tensor(array) for array in network.get_weights()]
+    parts: list[torch.nn.Module] = []
+    for kernel, bias in zip(weights[::2], weights[1::2], strict=True):
+        linear = torch.nn.Linear(*kernel.shape)
+        linear.load_state_dict({"weight": kernel.T, "bias": bias})
+        parts += [linear, torch.nn.Tanh()]
+    return torch.nn.Sequential(*parts[:-1])
+
+
+class Predicts:
+    """An object with the `predict` of Stable-Baselines3, whose actions are indices."""
+
+    action_space = SimpleNamespace(n=5, start=0)
+    observation_space = SimpleNamespace(shape=(3,))
+    gamma = 0.97
+
+    def __init__(self, network: kp.DQN) -> None:
+        self.q_net = torch_module(network)
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[Any], Any]:
+        assert deterministic
+        return self.q_net(torch.tensor(observation)).argmax(dim=-1).numpy(), None
+
+
+class PredictsTorque(Predicts):
+    """The same, with a continuous torque."""
+
+    action_space = SimpleNamespace(low=np.array([-2.0]), high=np.array([2.0]))
+
+    def predict(self, *args: Any, **options: Any) -> tuple[NDArray[Any], Any]:
+        return GRID[super().predict(*args, **options)[0]][..., np.newaxis], None
+
+
+def a_torque(network: kp.DQN) -> Callable[[NDArray[np.float32]], Any]:
+    policy = kp.Policy(network)
+    return lambda observation: policy(observation)[0]
+
+
+def an_array(network: kp.DQN) -> Callable[[NDArray[np.float32]], Any]:
+    return kp.Policy(network)
+
+
+def q_in_numpy(network: kp.DQN) -> Any:
+    return kp.q_function(kp.Policy(network).q_values, GRID)
+
+
+def q_in_tensorflow(network: kp.DQN) -> Any:
+    return kp.q_function(tf.function(lambda x: network(x)), list(GRID))
+
+
+def q_in_torch_with_gradients(network: kp.DQN) -> Any:
+    module = torch_module(network)
+    return kp.q_function(lambda x: module(torch.from_numpy(x)))
+
+
+KINDS: dict[str, Callable[[kp.DQN], Any]] = {
+    "policy": kp.Policy,
+    "Sequential": dense_chain,
+    "functional": lambda network: keras.Model(
+        inputs := keras.Input((3,)), dense_chain(network)(inputs)
+    ),
+    "subclassed": subclassed,
+    "NumPy": q_in_numpy,
+    "TensorFlow": q_in_tensorflow,
+    "PyTorch": lambda network: kp.q_function(torch_module(network)),
+    "PyTorch with gradients": q_in_torch_with_gradients,
+    "predict, indices": Predicts,
+    "predict, torque": PredictsTorque,
+    "torque": a_torque,
+    "torque in an array": an_array,
+    "Agent": as_agent,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_agent_has_the_returns_of_the_network(kind: str, network: kp.DQN) -> None:
+    source = KINDS[kind](network)
+    agent = as_agent(source)
+    own = as_agent(network)
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS), own.act(OBSERVATIONS))
+    if agent.q_values is not None:
+        assert own.q_values is not None
+        np.testing.assert_allclose(
+            agent.q_values(OBSERVATIONS), own.q_values(OBSERVATIONS), atol=1e-5
+        )
+        np.testing.assert_array_equal(agent.torques, GRID)
+    score, expected = (kp.evaluate_policy(each, 3) for each in (source, network))
+    np.testing.assert_allclose(score.returns, expected.returns, rtol=1e-9)
+
+
+@pytest.mark.parametrize("ending", [".h5", ".keras", ".weights.h5"])
+def test_file_of_keras_is_the_model(ending: str, network: kp.DQN, tmp_path: Path) -> None:
+    path = tmp_path / f"mine{ending}"
+    model = dense_chain(network)
+    (model.save_weights if ending == ".weights.h5" else model.save)(path)
+    agent = as_agent(path)
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS), as_agent(network).act(OBSERVATIONS))
+    assert agent.name == str(path)
+
+
+def test_keras_file_with_other_layers_is_read_by_keras(tmp_path: Path) -> None:
+    x = inputs = keras.Input((3,))
+    x = keras.layers.Dense(6, "gelu", use_bias=False)(x)
+    x = keras.layers.LayerNormalization()(x)
+    model = keras.Model(inputs, keras.layers.Dense(4)(x))
+    path = tmp_path / "mine.keras"
+    model.save(path)
+    with pytest.raises(kp.WeightsError, match="expected a chain of Dense layers"):
+        kp.load_weights(path)
+    agent = as_agent(path, torques=[-2, -1, 1, 2])
+    expected = np.array([-2, -1, 1, 2])[np.asarray(model(OBSERVATIONS)).argmax(axis=1)]
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS), expected)
+    model.save(tmp_path / "mine.h5")
+    with pytest.raises(kp.WeightsError, match=r"save other models as \.keras$"):
+        as_agent(tmp_path / "mine.h5")
+
+
+class Touch:
+    """A function that creates the file `touched`; Keras would have to unpickle or run it."""
+
+    def __call__(self, x: Any) -> Any:
+        Path("touched").touch()
+        return x
+
+
+def test_code_in_a_keras_file_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    model = keras.Sequential(
+        [keras.Input((3,)), keras.layers.Lambda(lambda x: x + 0), keras.layers.Dense(4)]
+    )
+    model.save("mine.keras")
+    with pytest.raises(kp.WeightsError, match=r"Keras cannot load it .* give file\.py:name"):
+        as_agent("mine.keras")
+
+
+def test_damaged_keras_file_never_reaches_keras(
+    tmp_path: Path, network: kp.DQN, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "mine.keras"
+    dense_chain(network).save(path)
+    path.write_bytes(path.read_bytes()[:-200])
+    monkeypatch.setattr(keras.saving, "load_model", None)
+    with pytest.raises(kp.WeightsError, match=r"mine\.keras: "):
+        as_agent(path)
+
+
+def test_network_without_weights_is_refused() -> None:
+    with pytest.raises(kp.UserError, match="has no weights yet"):
+        as_agent(Subclassed())
+
+
+def test_torch_module_is_evaluated_in_its_evaluation_mode(network: kp.DQN) -> None:
+    module = torch.nn.Sequential(torch.nn.Dropout(0.9), torch_module(network))
+    module[1].eval()
+    agent = as_agent(kp.q_function(module))
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS), as_agent(network).act(OBSERVATIONS))
+    assert [part.training for part in (module, module[0], module[1])] == [True, True, False]
+
+
+def test_torques_stand_for_the_outputs(network: kp.DQN) -> None:
+    torques = np.array([2.0, 1.5, 0.0, -1.5, -2.0])
+    index = kp.Policy(network).q_values(OBSERVATIONS).argmax(axis=1)
+    for source in (network, dense_chain(network), Predicts(network)):
+        agent = as_agent(source, torques=torques)
+        np.testing.assert_array_equal(agent.act(OBSERVATIONS), torques[index])
+        np.testing.assert_array_equal(agent.torques, torques)
+        if agent.env_action:
+            assert agent.env_action(OBSERVATIONS[0]) == torques[index[:1]]
+
+
+def test_known_discount_is_that_of_the_run_or_of_stable_baselines3(network: kp.DQN) -> None:
+    assert as_agent("swingup").discount == 0.98
+    assert as_agent(Predicts(network)).discount == 0.97
+    assert as_agent(network).discount is None
+    for config in (None, "", "{", "[]", "{}", '{"discount": 2}', '{"discount": "x"}', "[" * 10**5):
+        assert recorded_discount(Provenance(config=config)) is None
+
+
+def test_values_of_stable_baselines3s_dqn_are_known(network: kp.DQN) -> None:
+    agent = as_agent(Predicts(network))
+    assert agent.q_values is not None
+    expected = kp.Policy(network).q_values(OBSERVATIONS)
+    np.testing.assert_allclose(agent.q_values(OBSERVATIONS), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("torques", "problem"),
+    [
+        ([-2, 0, 2], "torques has 3 numbers; the agent has 5 actions"),
+        ([-2, -1, 0, 1, 2.5], "expected numbers from -2 to 2"),
+        ([-2, -1, 0, 1, np.nan], "expected numbers from -2 to 2"),
+        ([[0, 0, 0, 0, 0]], "expected a list of numbers"),
+        ([1, [2, 3]], "expected a list of numbers"),
+        ("abcde", "expected a list of numbers"),
+    ],
+)
+def test_wrong_torques_are_refused(torques: Any, problem: str, network: kp.DQN) -> None:
+    for source in (network, dense_chain(network), Predicts(network)):
+        with pytest.raises(kp.ConfigError, match=problem):
+            as_agent(source, torques)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [a_torque, PredictsTorque, q_in_numpy, lambda network: kp.load_policy("cartpole"), as_agent],
+)
+def test_torques_are_refused_where_nothing_stands_for_one(source: Any, network: kp.DQN) -> None:
+    with pytest.raises(kp.ConfigError, match=r"^torques "):
+        as_agent(source(network), torques=GRID)
+
+
+@pytest.mark.parametrize("source", [3, None, {}, kp.DQN, object(), torch.nn.Linear(3, 5)])
+def test_other_objects_are_refused_with_what_is_expected(source: Any) -> None:
+    with pytest.raises(TypeError, match=r"^agent is .*kp\.q_function"):
+        as_agent(source)
+
+
+def with_spaces(**spaces: Any) -> Any:
+    return type("Model", (Predicts,), spaces)(kp.DQN((8, 6), 5))
+
+
+@pytest.mark.parametrize(
+    ("spaces", "problem"),
+    [
+        ({"observation_space": SimpleNamespace(shape=(4,))}, r"of the shape \(4,\)"),
+        ({"action_space": SimpleNamespace(low=[-1.0], high=[1.0])}, "one torque from -2 to 2"),
+        ({"action_space": SimpleNamespace(low=[-2, -2], high=[2, 2])}, "one torque from -2 to 2"),
+        ({"action_space": SimpleNamespace(nvec=[3, 3])}, "one torque from -2 to 2"),
+    ],
+)
+def test_model_of_another_task_is_refused(spaces: dict[str, Any], problem: str) -> None:
+    with pytest.raises(kp.ConfigError, match=problem):
+        as_agent(with_spaces(**spaces))
+
+
+def answering(answer: Any) -> Agent:
+    return as_agent(lambda observation: answer)
+
+
+@pytest.mark.parametrize(
+    ("answer", "problem"),
+    [
+        (float("nan"), "the torque nan N·m; expected a number from -2 to 2"),
+        (np.array([np.inf]), "the torque inf N·m"),
+        (-2.001, "the torque -2.001 N·m"),
+        (np.zeros(2), r"an array of the shape \[2\]; expected a torque in N·m"),
+        (np.zeros((1, 1)), r"an array of the shape \[1, 1\]"),
+        ("left", "a str of the type <U4"),
+        (None, "a NoneType of the type object"),
+        (True, "a bool of the type bool"),
+        (1j, "a complex of the type complex128"),
+        ([[1], [2, 3]], "a list; expected a torque in N·m"),
+    ],
+)
+def test_answer_that_is_no_torque_is_refused(answer: Any, problem: str) -> None:
+    with pytest.raises(ActionError, match=f"^the agent returned {problem}"):
+        answering(answer).act(OBSERVATIONS)
+
+
+def test_torques_in_all_libraries_and_types_are_accepted() -> None:
+    for answer in (1, np.float32(1), np.array([1]), [1.0], torch.ones(1), tf.ones(()), np.int8(1)):
+        np.testing.assert_array_equal(answering(answer).act(OBSERVATIONS), np.ones(9))
+    half = torch.ones(1, dtype=torch.bfloat16, requires_grad=True)
+    np.testing.assert_array_equal(answering(half).act(OBSERVATIONS), np.ones(9))
+
+
+@pytest.mark.parametrize(
+    ("answer", "problem"),
+    [
+        ((np.full(9, 5), None), "the index 5; expected an integer from 0 to 4"),
+        ((np.full(9, -1), None), "the index -1"),
+        ((np.full(9, 1.0), None), "a number of the type float64"),
+        ((np.zeros(8, int), None), r"an array of the shape \[8\]"),
+        (np.zeros(9, int), r"expected a pair \(action, state\)"),
+    ],
+)
+def test_answer_that_is_no_index_is_refused(answer: Any, problem: str) -> None:
+    model = with_spaces(predict=lambda self, observation, deterministic: answer)
+    with pytest.raises(ActionError, match=problem):
+        as_agent(model).act(OBSERVATIONS)
+
+
+@pytest.mark.parametrize(
+    ("function", "problem"),
+    [
+        (lambda x: x[:, 0], r"an array of the shape \[2\]; expected Q-values of the shape \[2, "),
+        (lambda x: x[:1], r"an array of the shape \[1, 3\]"),
+        (lambda x: x[:, :1], r"an array of the shape \[2, 1\]"),
+        (lambda x: x * np.nan, "a Q-value that is not finite"),
+        (lambda x: {"q": x}, "a dict of the type object"),
+        (lambda x: x.missing, r"raised AttributeError: .*missing.* \(test_agents.py, line \d+\)$"),
+    ],
+)
+def test_function_that_gives_no_q_values_is_refused_at_once(function: Any, problem: str) -> None:
+    with pytest.raises(kp.UserError, match=f"^the agent (returned )?{problem}"):
+        kp.q_function(function)
+
+
+def test_q_function_needs_a_function() -> None:
+    with pytest.raises(TypeError, match=r"^function is 3; expected a function"):
+        kp.q_function(3)  # type: ignore[arg-type]
+
+
+def test_row_of_a_wrong_answer_is_known() -> None:
+    def act(observation: NDArray[np.float32]) -> float:
+        return 3.0 if (observation == OBSERVATIONS[6]).all() else 0.0
+
+    with pytest.raises(ActionError) as caught:
+        as_agent(act).act(OBSERVATIONS)
+    assert caught.value.row == 6
