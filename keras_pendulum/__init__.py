@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from keras_pendulum.config.presets import preset
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
-    from keras_pendulum.evaluate.evaluation import Score, evaluate_policy
+    from keras_pendulum.evaluate.evaluation import evaluate_policy
     from keras_pendulum.evaluate.loaded_policy import Policy, load_policy
     from keras_pendulum.evaluate.q_functions import q_function
+    from keras_pendulum.evaluate.score import Score
     from keras_pendulum.optimum.optimal_return import optimal_return
     from keras_pendulum.storage.find_weights import find_weights
     from keras_pendulum.storage.weights import load_weights, save_weights
@@ -55,9 +56,10 @@ _MODULES = {
     "config.presets": ("preset",),
     "dqn.network": ("DQN",),
     "errors": ("ConfigError", "UserError", "WeightsError"),
-    "evaluate.evaluation": ("Score", "evaluate_policy"),
+    "evaluate.evaluation": ("evaluate_policy",),
     "evaluate.loaded_policy": ("Policy", "load_policy"),
     "evaluate.q_functions": ("q_function",),
+    "evaluate.score": ("Score",),
     "optimum.optimal_return": ("optimal_return",),
     "storage.find_weights": ("find_weights",),
     "storage.weights": ("load_weights", "save_weights"),

@@ -120,6 +120,26 @@ def add_activation_flag(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_torques_flag(parser: argparse.ArgumentParser) -> None:
+    """Adds the flag for agents whose outputs stand for other torques than `linspace(-2, 2, A)`."""
+    parser.add_argument(
+        "--torques",
+        type=_numbers,
+        metavar="N·m,…",
+        help="torques that the outputs stand for, such as --torques=-2,0,2 [evenly spaced from -2 "
+        "to 2]",
+    )
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no list of numbers such as -2,0,2"
+        ) from error
+
+
 def run_command(command: Callable[[], int]) -> int:
     """Returns the exit status of `command`; a UserError is one line on stderr and status 2.
 

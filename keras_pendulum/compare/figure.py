@@ -11,7 +11,7 @@ from keras_pendulum.compare.curve_style import CurveStyle, curve_style
 from keras_pendulum.compare.runs import ComparedRun
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import one_line
-from keras_pendulum.evaluate.evaluation import Score
+from keras_pendulum.evaluate.score import Score
 from keras_pendulum.train.learning_curve import trailing_mean
 
 if TYPE_CHECKING:

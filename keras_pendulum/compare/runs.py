@@ -13,7 +13,8 @@ from keras_pendulum.config.fields import format_value
 from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.environments.tasks import TASKS, task_name
 from keras_pendulum.errors import UserError
-from keras_pendulum.evaluate.evaluation import Score, evaluate_policy, optimal_training_return
+from keras_pendulum.evaluate.evaluation import evaluate_policy, optimal_training_return
+from keras_pendulum.evaluate.score import Score
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.weights import load_weights
 from keras_pendulum.train.checkpoint import load_history

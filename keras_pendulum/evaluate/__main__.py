@@ -7,9 +7,10 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-from keras_pendulum.cli import OneLineParser, add_activation_flag, run_command
+from keras_pendulum.cli import OneLineParser, add_activation_flag, add_torques_flag, run_command
 from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
@@ -22,11 +23,13 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     """Runs the command; returns its exit status."""
     parser = OneLineParser(
         prog=prog,
-        description="Evaluate the policy in a weights file and compare it with the best possible "
-        "return.",
+        description="Evaluate a policy and compare it with the best possible return.",
     )
-    weights = parser.add_argument(
-        "weights", metavar="WEIGHTS.h5", help="a file, or the name of a shipped one"
+    agent = parser.add_argument(
+        "agent",
+        metavar="AGENT",
+        help="a weights file (.h5, .keras), the name of a shipped one, or an agent in your own "
+        "code, which is run: file.py:name or package.module:name (docs/agents.md)",
     )
     parser.add_argument(
         "--episodes", type=int, default=100, metavar="N", help="number of episodes [100]"
@@ -41,11 +44,19 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     parser.add_argument(
         "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
     )
+    parser.add_argument(
+        "--discount",
+        type=float,
+        metavar="γ",
+        help="discount that the policy learned with; the score then says what the discount alone "
+        "costs [recorded in the file]",
+    )
+    add_torques_flag(parser)
     add_activation_flag(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--render", action="store_true", help="show the episodes in a window")
     add_film_flags(parser)
-    complete_with(weights, weights_files(shipped_names))
+    complete_with(agent, weights_files(shipped_names))
     arguments = parser.parse_args(argv)
     return run_command(lambda: _evaluate(arguments))
 
@@ -58,28 +69,27 @@ def _evaluate(arguments: argparse.Namespace) -> int:
 
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluate_policy
-        from keras_pendulum.evaluate.loaded_policy import Policy
-        from keras_pendulum.storage.find_weights import find_weights
-        from keras_pendulum.storage.weights import load_weights
+        from keras_pendulum.evaluate.named_agent import named_agent
 
     def require_open_window(env: Any) -> None:
-        if arguments.render and _window_closed():  # Gymnasium ignores a closed window
+        if _window_closed():  # Gymnasium ignores a closed window
             raise UserError("the window was closed before the end of the last episode")
 
-    path = find_weights(arguments.weights)
-    network = load_weights(path, arguments.activation)
+    agent, name = named_agent(arguments.agent, arguments.torques, arguments.activation)
     score = evaluate_policy(
-        network,
+        agent,
         arguments.episodes,
         arguments.seed,
         gravity=arguments.gravity,
+        discount=arguments.discount,
         render_mode="human" if arguments.render else None,
-        on_step=require_open_window,
+        on_step=require_open_window if arguments.render else None,
     )
     if arguments.gif or arguments.video:
-        make_films(arguments, Policy(network), score.environment, score.gravity, path.stem)
+        shown = Path(name).stem if Path(name).is_file() else name
+        make_films(arguments, agent.action, score.environment, score.gravity, shown)
     if arguments.json:
-        print(json.dumps({"weights": str(path), **score.as_json()}))
+        print(json.dumps({"weights": name, **score.as_json()}))
     else:
         print(score.summary())
     return 0

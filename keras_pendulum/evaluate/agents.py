@@ -55,6 +55,12 @@ class Agent:
     # One observation [D] to the action as the environment takes it, without checks.
     env_action: Callable[[NDArray[np.float32]], Any] | None = None
 
+    def action(self, observation: NDArray[np.float32]) -> Any:
+        """Returns the action for one observation [D], as the environment takes it."""
+        if self.env_action is not None:
+            return self.env_action(observation)
+        return self.act(observation[np.newaxis])  # [1]
+
     @property
     def environment(self) -> str:
         """Gymnasium's name of the agent's environment."""

@@ -24,6 +24,7 @@ import io
 import logging
 import math
 from collections.abc import Iterable
+from functools import cache
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -82,19 +83,19 @@ def discounted_value(gravity: float, discount: float, cells: int = CELLS) -> NDA
     """
     gravity, discount = validate_gravity(gravity), validate_discount(discount)
     folder = cache_folder() if cells == CELLS else None
-    cache = folder / f"value_{file_name(gravity, STEPS_PER_EPISODE, discount)}" if folder else None
-    table = _read(cache, gravity, discount) if cache else None
+    file = folder / f"value_{file_name(gravity, STEPS_PER_EPISODE, discount)}" if folder else None
+    table = _read(file, gravity, discount) if file else None
     if table is None:
         _log.warning(
             "Computing the exact values for g = %g and γ = %g, once: about 5 s", gravity, discount
         )
         table = _solve(gravity, discount, cells)
         with contextlib.suppress(OSError, UserError):  # the cache only saves time
-            if cache:
-                cache.parent.mkdir(parents=True, exist_ok=True)
+            if file:
+                file.parent.mkdir(parents=True, exist_ok=True)
                 buffer = io.BytesIO()
                 np.savez_compressed(buffer, gravity=gravity, discount=discount, value=table)
-                write_atomically(cache, buffer.getvalue())
+                write_atomically(file, buffer.getvalue())
     return table
 
 
@@ -153,6 +154,16 @@ def discounted_return(
         return simulate_discounted(gravity, discount, pendulum_starts(missing))
 
     return stored_returns(seeds, compute, USUAL_SEEDS, gravity, STEPS_PER_EPISODE, discount)
+
+
+@cache
+def discount_cost(gravity: float, discount: float, seeds: range) -> float:
+    """Returns the regret of the policy that is optimal for a discount: what γ alone costs.
+
+    It is the mean difference between `optimal_return` and `discounted_return`, at least 0.
+    """
+    loss = optimal_return(gravity, seeds) - discounted_return(gravity, discount, seeds)
+    return max(0.0, float(loss.mean()))
 
 
 def simulate_discounted(

@@ -23,7 +23,7 @@ from keras_pendulum.version import __version__
 EPISODES_PER_POINT = 10  # of a learning curve
 _EVALUATIONS = 10  # of the greedy policy during a run, at most
 _DECIMALS = 6  # of a learning curve
-_EVALUATION_EPISODES = 100
+EVALUATION_EPISODES = 100
 
 
 class Job(NamedTuple):
@@ -86,7 +86,7 @@ def train_and_score(job: Job) -> Reply:
         on_phase=clock.begin,
     )
     trained = time.perf_counter()
-    score = evaluate_policy(training.network, _EVALUATION_EPISODES)
+    score = evaluate_policy(training.network, EVALUATION_EPISODES)
     evaluated = time.perf_counter()
     result = RunResult(
         optimal_mean_return=score.optimal_mean_return,
@@ -199,7 +199,7 @@ def _is_possible(result: RunResult, config: Config) -> bool:
 
     return (
         are_possible([result.optimal_mean_return], 1, task.steps_per_episode)
-        and are_possible(result.returns, _EVALUATION_EPISODES, task.steps_per_episode)
+        and are_possible(result.returns, EVALUATION_EPISODES, task.steps_per_episode)
         and are_possible(result.average_rewards, points, 1)
         and are_possible(result.episode_returns, points, config.max_episode_steps)
         and len(result.greedy_regrets) in (0, evaluations)

@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from keras_pendulum.optimum.discounted import discount_cost
 from keras_pendulum.study.arms import Arm
-from keras_pendulum.study.job import RunResult
+from keras_pendulum.study.job import EVALUATION_EPISODES, RunResult
 from keras_pendulum.study.statistics import Interval, interquartile_mean, probability_of_improvement
 
 
@@ -22,6 +23,7 @@ class Row:
     arm: Arm
     regrets: list[float]  # by seed
     regret: Interval  # interquartile mean
+    discount_regret: float | None  # of the exact policy for the arm's discount; None for CartPole
     better: Interval | None  # probability that a run has less regret than one of the baseline
 
     def as_json(self) -> dict[str, Any]:
@@ -32,6 +34,7 @@ class Row:
             "regret_high": self.regret.high,
             "regret_mean": sum(self.regrets) / len(self.regrets),
             "regret_worst": max(self.regrets),
+            "discount_regret": math.nan if self.discount_regret is None else self.discount_regret,
         }
         better = self.better or Interval(math.nan, math.nan, math.nan)
         numbers |= dict(
@@ -54,15 +57,23 @@ def make_rows(arms: Sequence[Arm], results: Mapping[str, Sequence[RunResult]]) -
         own, baseline = regrets[arm.name], regrets.get(arm.baseline or "", [])
         if own:
             better = probability_of_improvement(own, baseline) if baseline else None
-            rows.append(Row(arm, own, interquartile_mean(own), better))
+            rows.append(Row(arm, own, interquartile_mean(own), _discount_regret(arm), better))
     return rows
+
+
+def _discount_regret(arm: Arm) -> float | None:
+    """Returns the part of the regret that the discount alone costs; None for CartPole."""
+    if arm.config.gravity is None:
+        return None
+    return discount_cost(arm.config.gravity, arm.config.discount, range(EVALUATION_EPISODES))
 
 
 def as_markdown(rows: Sequence[Row]) -> str:
     """Returns the table for people."""
     lines = [
-        "| arm | task | runs | regret | 95 % interval | mean | worst | better than … in |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| arm | task | runs | regret | 95 % interval | mean | worst | better than … in "
+        "| discount alone |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:
         numbers = row.as_json()
@@ -75,17 +86,19 @@ def as_markdown(rows: Sequence[Row]) -> str:
             _number(numbers["regret_mean"]),
             _number(numbers["regret_worst"]),
             "–",
+            "–" if row.discount_regret is None else _number(row.discount_regret),
         ]
         if row.better:
             share = f"{row.better.value:.0%} ({_range(row.better, '{:.0%}'.format)})"
-            cells[-1] = f"{row.arm.baseline}: {share}"
+            cells[-2] = f"{row.arm.baseline}: {share}"
         lines.append(f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |")
     return (
         "\n".join(lines)
         + "\n\nRegret: the best possible mean return on 100 fixed starts minus the greedy mean "
-        "return; its interquartile mean over the runs, with a 95 % bootstrap interval. Last "
-        "column: the share of pairs of runs in which this arm's run has less regret than the named "
-        "arm's.\n"
+        "return; its interquartile mean over the runs, with a 95 % bootstrap interval. "
+        "Better than: the share of pairs of runs in which this arm's run has less regret than the "
+        "named arm's. Discount alone: the regret of the exact policy for the arm's discount; the "
+        "rest is left to learning.\n"
     )
 
 

@@ -11,7 +11,7 @@ from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.environments.tasks import TASKS
 
 if TYPE_CHECKING:
-    from keras_pendulum.evaluate.evaluation import Score
+    from keras_pendulum.evaluate.score import Score
     from keras_pendulum.history import EpisodeRecord
     from keras_pendulum.train.run_folder import RunFolder
     from keras_pendulum.train.train_dqn import TrainingResult

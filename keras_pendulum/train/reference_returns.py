@@ -6,7 +6,8 @@ import math
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, task_name
-from keras_pendulum.evaluate.evaluation import Score, optimal_training_return, random_return
+from keras_pendulum.evaluate.evaluation import optimal_training_return, random_return
+from keras_pendulum.evaluate.score import Score
 from keras_pendulum.optimum.discounted import discounted_return
 from keras_pendulum.optimum.optimal_return import USUAL_SEEDS
 from keras_pendulum.train.learning_curve import OPTIMUM, RANDOM

@@ -11,7 +11,8 @@ from typing import Literal
 from keras_pendulum.config.config import Config
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.errors import UserError, require_type
-from keras_pendulum.evaluate.evaluation import Score, evaluate_policy
+from keras_pendulum.evaluate.evaluation import evaluate_policy
+from keras_pendulum.evaluate.score import Score
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.phase_plane import run_phase_planes
 from keras_pendulum.storage.atomic_write import write_atomically

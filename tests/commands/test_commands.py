@@ -315,7 +315,7 @@ WRONG = [
     (["train", "--environment", "CartPole-v1"], "take the preset cartpole (--preset cartpole)"),
     (["train", "--out", "text.h5"], "cannot make the folder text.h5"),
     (["train", "--out", "text.h5/run"], "cannot make the folder text.h5"),
-    (["evaluate"], "the following arguments are required: WEIGHTS.h5"),
+    (["evaluate"], "the following arguments are required: AGENT"),
     (["evaluate", "missing.h5"], "missing.h5: no such file"),
     (["evaluate", "text.h5"], "text.h5: not an HDF5 file"),
     (["evaluate", "n" * 300], "File name too long"),

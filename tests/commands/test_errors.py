@@ -63,9 +63,6 @@ def test_wrong_types_are_refused_and_the_error_says_what_is_expected(tmp_path: P
             config,
             init="path",  # type: ignore[arg-type]
         ),
-        "agent is 3; expected DQN or Policy or str or PathLike": lambda: kp.evaluate_policy(
-            3  # type: ignore[arg-type]
-        ),
         "network is None; expected DQN": lambda: kp.save_weights(
             None,  # type: ignore[arg-type]
             tmp_path / "a.h5",

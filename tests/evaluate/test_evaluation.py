@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import gymnasium
@@ -14,6 +15,7 @@ from keras_pendulum.evaluate.evaluation import (
     optimal_training_return,
     random_return,
 )
+from keras_pendulum.optimum.discounted import discounted_return
 
 
 def test_returns_equal_those_of_a_plain_loop_on_gymnasium() -> None:
@@ -63,7 +65,62 @@ def test_score_computes_its_statistics() -> None:
         "worst_return": -9.0,
         "optimal_mean_return": -2.0,
         "regret": 2.0,
+        "discount": None,
+        "discount_regret": None,
+        "learning_regret": None,
     }
+
+
+def score_with_discount(regret: float) -> kp.Score:
+    """Returns a score for γ = 0.9 at g = 1, which costs 0.245 of the regret."""
+    optimum = kp.optimal_return(1.0, range(100))
+    return kp.Score("Pendulum-v1", 1.0, optimum - regret, optimum, 0.9, range(100))
+
+
+def test_regret_has_a_part_of_the_discount_and_one_of_learning() -> None:
+    score = score_with_discount(2.0)
+    returns = discounted_return(1.0, 0.9, range(100))
+    cost = (kp.optimal_return(1.0, range(100)) - returns).mean()
+    assert score.discount_regret == pytest.approx(cost)
+    assert score.learning_regret == pytest.approx(2 - cost)
+    values = score.as_json()
+    assert values["discount"] == 0.9
+    assert values["discount_regret"] + values["learning_regret"] == pytest.approx(values["regret"])
+    assert score.summary().splitlines()[2:] == [
+        "Regret: 2.00",
+        f"Exact policy for the discount 0.9: regret {cost:.2f}; the other {2 - cost:.2f} are left "
+        "to learning",
+    ]
+    assert (
+        score_with_discount(0.1)
+        .summary()
+        .splitlines()[3]
+        .endswith(f"regret {cost:.2f}; this policy is better by {cost - 0.1:.2f}")
+    )
+
+
+def test_discount_is_the_given_one_else_the_recorded_one() -> None:
+    scores = [kp.evaluate_policy("reference", 1, discount=given) for given in (None, 1, 0.9)]
+    recorded = json.loads(kp.load_weights("reference").provenance.config or "")["discount"]
+    assert [score.discount for score in scores] == [recorded, 1, 0.9]
+    assert scores[1].discount_regret == 0
+    assert kp.evaluate_policy(kp.DQN((8,)), 1).discount is None
+    with pytest.raises(kp.ConfigError, match=r"^discount is 1\.5; expected a number from 0 to 1$"):
+        kp.evaluate_policy("reference", 1, discount=1.5)
+    with pytest.raises(kp.ConfigError, match=r"^discount belongs to Pendulum-v1"):
+        kp.evaluate_policy("cartpole", 1, discount=0.9)
+
+
+@pytest.mark.parametrize(
+    ("excess", "reason"),
+    [
+        (0.0011, "0.0011 above the best known one: a torque between the 41 of the optimum can"),
+        (0.3, "0.3000 above the best known one: torques between the 41 of the optimum gain at"),
+    ],
+)
+def test_return_above_the_best_one_with_41_torques_is_explained(excess: float, reason: str) -> None:
+    line = score_with_discount(-excess).summary().splitlines()[2]
+    assert line.startswith(f"Regret: 0.00 (the mean return is {reason} ")
 
 
 def test_summary_has_the_same_three_lines_for_both_environments() -> None:

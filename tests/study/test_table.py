@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from keras_pendulum.optimum.discounted import discounted_return
+from keras_pendulum.optimum.optimal_return import optimal_return
 from keras_pendulum.study.arms import own_arms
 from keras_pendulum.study.job import RunResult
 from keras_pendulum.study.table import as_csv, as_json, as_markdown, make_rows
@@ -33,3 +35,14 @@ def test_columns_have_the_numbers_of_their_names() -> None:
     cells = as_markdown(rows).splitlines()[3].split(" | ")
     assert [cells[place] for place in (2, 3, 5, 6)] == ["4", "3.50", "7.00", "20.0"]
     assert cells[7].startswith("reference: 75% (")
+
+
+def test_table_has_the_regret_that_the_discount_alone_costs() -> None:
+    arms = own_arms(["reference", "cartpole"], ["exact: reference discount=1"])
+    rows = make_rows(arms, {arm.name: [RunResult(0.0, [-9.0], [], [])] for arm in arms})
+    costs = [row["discount_regret"] for row in json.loads(as_json(rows, {}))["rows"]]
+    gamma = arms[0].config.discount
+    returns = discounted_return(1.0, gamma, range(100))
+    assert costs == [pytest.approx((optimal_return(1.0, range(100)) - returns).mean()), None, 0.0]
+    cells = [line.rstrip("| ").split(" | ")[8] for line in as_markdown(rows).splitlines()[2:5]]
+    assert cells == [f"{costs[0]:.2f}", "–", "0.00"]
