@@ -21,6 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from keras_pendulum.environments.actions import MAX_TORQUE
 from keras_pendulum.environments.tasks import STEPS_PER_EPISODE
 from keras_pendulum.optimum.dynamics import (
     MAX_SPEED,
@@ -47,7 +48,10 @@ def solve(
 
 
 def value_tables(
-    gravity: float, theta_cells: int, discount: float = 1.0
+    gravity: float,
+    theta_cells: int,
+    discount: float = 1.0,
+    cells_per_torque: int = CELLS_PER_TORQUE,
 ) -> Iterator[NDArray[np.float32]]:
     """Yields V with 0, 1, 2, … steps to go, without end.
 
@@ -60,6 +64,8 @@ def value_tables(
         gravity: g in m/s².
         theta_cells: number of cells in [-π, 0], at least 10.
         discount: γ; 1 for the undiscounted return of an episode.
+        cells_per_torque: cells from one torque's effect to the next one's: 3 for the 41 torques, 1
+            for 121.
 
     Yields:
         [3201, theta_cells + 1]: rows are θ̇ from -8 to 8 rad/s, columns are θ from -π to 0 rad.
@@ -69,7 +75,9 @@ def value_tables(
     theta = np.linspace(-np.pi, 0, theta_cells + 1)  # [T] rad
     rows, columns = len(speed), len(theta)
     reward = (-(theta**2) - 0.1 * speed[:, None] ** 2).astype(np.float32)  # [S, T], torque 0
-    torque_cost = (0.001 * TORQUES[len(TORQUES) // 2 :] ** 2).astype(np.float32)  # [21], u ≥ 0
+    reach = CELLS_PER_TORQUE * (len(TORQUES) // 2)  # rows by which 2 N·m change the speed
+    torques = np.linspace(0, MAX_TORQUE, reach // cells_per_torque + 1)
+    torque_cost = (0.001 * torques**2).astype(np.float32)  # [21], u ≥ 0
 
     theta_shift, theta_weight = _whole_and_fraction(TIME_STEP * speed * theta_cells / np.pi)  # [S]
     margin = int(theta_shift.max()) + 2
@@ -79,7 +87,6 @@ def value_tables(
     speed_shift, speed_weight = _whole_and_fraction(
         TIME_STEP * 1.5 * gravity * np.sin(theta) / SPEED_STEP
     )  # [T]
-    reach = CELLS_PER_TORQUE * (len(TORQUES) // 2)  # rows by which 2 N·m change the speed
     pad = reach + int(np.abs(speed_shift).max()) + 2
     successor_line = np.empty((rows + 2 * pad, columns), np.float32)  # γ V(θ + dt·w, w)
     strips = [slice(first, first + STRIP_WIDTH) for first in range(0, columns, STRIP_WIDTH)]
@@ -107,7 +114,7 @@ def value_tables(
         best = successor[reach : reach + rows].copy()  # torque 0
         best_sign = np.empty_like(best)  # the better one of u and -u
         for k in range(1, len(torque_cost)):
-            shift = k * CELLS_PER_TORQUE
+            shift = k * cells_per_torque
             positive = successor[reach + shift : reach + shift + rows]
             negative = successor[reach - shift : reach - shift + rows]
             np.maximum(positive, negative, out=best_sign)

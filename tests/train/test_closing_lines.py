@@ -133,6 +133,15 @@ def test_policy_worse_than_random_actions_says_why(
     assert warnings(config, last, good, tmp_path) == []
 
 
+def test_regret_is_shown_in_two_parts(tmp_path: Path) -> None:
+    optimum = kp.optimal_return(1.0, range(100))
+    score = kp.Score("Pendulum-v1", 1.0, optimum - 3, optimum, 0.9, range(100))
+    lines = lines_after(kp.preset("reference"), record(499, 100), tmp_path, score=score)
+    place = lines.index("Regret: 3.00")
+    assert lines[place + 1].startswith("Exact policy for the discount 0.9: regret 0.24; the other ")
+    assert lines[place + 2].startswith("Uniformly random actions")
+
+
 def test_interrupted_run_is_not_judged_and_can_be_continued(tmp_path: Path) -> None:
     config = kp.preset("reference")
     lines = lines_after(config, record(3, 0), tmp_path, finished=False)
