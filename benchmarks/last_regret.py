@@ -37,7 +37,13 @@ from keras_pendulum.study.arms import own_arms
 
 STARTS = range(1000, 1300)
 # The arms of each picture, written as for the study; the last one is the preset.
-ARMS = {"reference": ["reference: reference"], "swingup": ["swingup: swingup"]}
+ARMS = {
+    "reference": [
+        "before: reference max_episode_steps=200 replay_capacity=25000 updates_per_episode=30",
+        "reference: reference",
+    ],
+    "swingup": ["swingup: swingup"],
+}
 UPRIGHT = 0.3, 1.0  # |θ| in rad and |θ̇| in rad/s below which the pendulum has arrived
 HANGING = 0.5  # rad; a start closer than this to hanging is near the watershed
 _NO_TORQUE = len(TORQUES) // 2  # the index of 0 N·m

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 import keras_pendulum as kp
+from benchmarks.departures import interval
 from benchmarks.report import run_process, write
 from keras_pendulum.environments.tasks import TASKS
 
@@ -63,7 +64,9 @@ def table_row(preset: str, scores: list[kp.Score], seconds: float) -> dict[str, 
         "best possible return": f"{scores[0].optimal_mean_return:.1f}",
         "mean return": f"{np.mean([score.mean_return for score in scores]):.1f}",
         "mean regret": f"{np.mean([score.regret for score in scores]):.1f}",
-        "regret with seed 0, 1, …": ", ".join(f"{score.regret:.1f}" for score in scores),
+        "95 % interval": interval([score.regret for score in scores]),
+        "worst run": f"{max(score.regret for score in scores):.1f}",
+        "runs": len(scores),
         "whole command": f"{seconds:.0f} s",
     }
 

@@ -36,7 +36,7 @@ class Config:
     )
     episodes: int = setting(500, "episodes of the run", Integer(1, 1_000_000))
     max_episode_steps: int = setting(
-        200,
+        100,
         "steps after which a training episode is truncated; an evaluation uses Gymnasium's limit",
         Integer(1, 10_000),
     )
@@ -55,7 +55,7 @@ class Config:
         41, "torques of the pendulum, linspace(-2, 2, torque_count) N·m", Integer(2, 1001)
     )
     replay_capacity: int = setting(
-        25_000, "transitions in the replay buffer", Integer(1, 10_000_000)
+        14_000, "transitions in the replay buffer", Integer(1, 10_000_000)
     )
     batch_size: int = setting(
         32, "transitions of one update, drawn without replacement", Integer(1, 65_536)
@@ -101,7 +101,7 @@ class Config:
         41, "episodes before the first update (train_frequency episode)", Integer(0, 1_000_000)
     )
     updates_per_episode: int = setting(
-        30, "updates after each episode (train_frequency episode)", Integer(1, 10_000)
+        40, "updates after each episode (train_frequency episode)", Integer(1, 10_000)
     )
     optimizer: str = setting(
         "adam",

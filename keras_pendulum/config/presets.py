@@ -14,6 +14,7 @@ _REFERENCE = Config()
 _ORIGINAL = replace(
     _REFERENCE,
     preset="original",
+    max_episode_steps=200,
     replay_capacity=8000,
     updates_per_episode=1,
     learning_rate_schedule="constant",
@@ -37,10 +38,12 @@ _SWINGUP = replace(
     gravity=10.0,
     episodes=1700,
     max_episode_steps=60,
+    replay_capacity=25_000,
     batch_size=64,
     discount=0.98,
     reward_scale=0.02,
     epsilon_decay=0.997,
+    updates_per_episode=30,
 )
 
 # The agent of the two PyTorch notebooks, with their numbers.

@@ -169,10 +169,10 @@ def test_mistyped_old_flag_is_not_refused_with_the_old_one(
     ("name", "defaults"),
     [
         ("episodes", "[reference: 500, cartpole-original: 600]"),
-        ("replay_capacity", "[reference: 25000, original: 8000, cartpole-original: 10000]"),
+        ("replay_capacity", "[reference: 14000, original: 8000, cartpole-original: 10000]"),
         ("gravity", "[reference: 1.0, cartpole-original: none]"),
         ("hidden_units", "[reference: 512,256,128, cartpole-original: 128,128]"),
-        ("updates_per_episode", "[reference: 30, original: 1]"),
+        ("updates_per_episode", "[reference: 40, original: 1]"),
         ("target_update", "[reference: soft, original: none]"),
         ("double_q", "[reference: false]"),
         ("seed", "[reference: 0]"),

@@ -46,20 +46,20 @@ def test_reference_is_the_default_and_has_no_defect() -> None:
     assert kp.preset() == kp.preset("reference") == Config()
     assert Config().target_update != "none"
     assert Config().stored_index == "exact"
-    assert Config().total_updates == 30 * 459
+    assert Config().total_updates == 40 * 459
     assert Config().train_frequency == "episode"
 
 
 def test_reference_has_its_numbers() -> None:
     config = kp.preset("reference")
     assert (config.environment, config.gravity) == ("Pendulum-v1", 1.0)
-    assert (config.episodes, config.max_episode_steps, config.seed) == (500, 200, 0)
+    assert (config.episodes, config.max_episode_steps, config.seed) == (500, 100, 0)
     assert (config.hidden_units, config.activation) == ((512, 256, 128), "tanh")
     assert (config.initial_weights, config.torque_count) == ("glorot", 41)
-    assert (config.replay_capacity, config.batch_size) == (25_000, 32)
+    assert (config.replay_capacity, config.batch_size) == (14_000, 32)
     assert (config.discount, config.reward_scale, config.double_q) == (0.9, 1.0, False)
     assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.99, 0.01)
-    assert (config.warmup_episodes, config.updates_per_episode) == (41, 30)
+    assert (config.warmup_episodes, config.updates_per_episode) == (41, 40)
     assert (config.optimizer, config.optimizer_epsilon, config.loss) == ("adam", 1e-7, "squared")
     assert (config.weight_decay, config.gradient_clip) == (0.0, None)
     assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "cosine")

@@ -80,7 +80,9 @@ def test_optimizer_has_the_numbers_of_the_settings(
     ("schedule", "rates"), [("cosine", [1e-3, 0.5e-3, 0, 0]), ("constant", [1e-3] * 4)]
 )
 def test_learning_rate_follows_its_schedule(schedule: str, rates: list[float]) -> None:
-    config = kp.preset("reference", episodes=44, learning_rate_schedule=schedule)
+    config = kp.preset(
+        "reference", episodes=44, updates_per_episode=30, learning_rate_schedule=schedule
+    )
     assert config.total_updates == 90
     run = make_run(config)
     found = []
