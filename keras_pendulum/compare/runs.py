@@ -39,7 +39,10 @@ class ComparedRun:
             if getattr(self.config, spec.name) != getattr(preset, spec.name)
         }
         # These have a column of their own, or change nothing.
-        for name in ("preset", "seed", "episodes", "save_every", "evaluate_every", "keep_best"):
+        for name in (
+            *("preset", "seed", "episodes"),
+            *("save_every", "evaluate_every", "keep_best", "snapshots"),
+        ):
             changes.pop(name, None)
         return " ".join(f"{name}={format_value(value)}" for name, value in changes.items())
 

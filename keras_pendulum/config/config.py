@@ -157,6 +157,12 @@ class Config:
         "last weights",
         Switch(),
     )
+    snapshots: int = setting(
+        0,
+        "networks of the run to keep for the page, evenly spaced from the initial to the final "
+        "one, as ..._snapshots.h5; 0 for none",
+        Integer(0, 100),
+    )
 
     def __post_init__(self) -> None:
         for spec in fields(self):
@@ -164,6 +170,7 @@ class Config:
             object.__setattr__(self, spec.name, value)
         self._check_task()
         self._check_evaluations()
+        self._check_snapshots()
         self._check_size()
         if self.train_frequency == "step" and self.learning_rate_schedule == "cosine":
             raise ConfigError(
@@ -214,8 +221,18 @@ class Config:
                 "--evaluate-every 50"
             )
 
+    def _check_snapshots(self) -> None:
+        """Raises ConfigError where the run has fewer networks than it shall keep."""
+        if self.snapshots == 1:
+            raise ConfigError("snapshots is 1; expected 0 for none, or 2 to 100")
+        if self.snapshots > self.episodes + 1:
+            raise ConfigError(
+                f"snapshots {self.snapshots} is larger than the run's {self.episodes} episodes "
+                "plus 1: make it smaller, or 0 for none"
+            )
+
     def _check_size(self) -> None:
-        """Raises ConfigError for a run whose checkpoint would be too large to load."""
+        """Raises ConfigError for a run with a file that would be too large to load."""
         task = TASKS[self.environment]
         outputs = task.action_count or self.torque_count
         widths = (task.observation_size, *self.hidden_units, outputs)
@@ -228,6 +245,12 @@ class Config:
             raise ConfigError(
                 f"hidden_units and replay_capacity make a checkpoint of {size / 2**30:.1f} GiB; "
                 "the limit is 1 GiB: make them smaller"
+            )
+        size = (4 + 2 * self.snapshots) * weights  # one network in float32, the others in float16
+        if self.snapshots and size > LARGEST_FILE - 2**20:
+            raise ConfigError(
+                f"snapshots and hidden_units make a file of {size / 2**30:.1f} GiB; the limit is "
+                "1 GiB: make them smaller"
             )
 
     @property

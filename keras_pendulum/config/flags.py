@@ -20,7 +20,7 @@ _FIRST = (
     *("epsilon_decay", "updates_per_episode", "learning_rate"),
 )
 # These change nothing in what is learned, and `--help` shows them too.
-_EVALUATIONS = ("evaluate_every", "keep_best")
+_DURING_THE_RUN = ("evaluate_every", "keep_best", "snapshots")
 
 
 def add_config_flags(parser: OneLineParser) -> None:
@@ -31,9 +31,9 @@ def add_config_flags(parser: OneLineParser) -> None:
     first = parser.add_argument_group(
         "settings that people change first (each preset has its own defaults)"
     )
-    evaluations = parser.add_argument_group("evaluations during the run")
+    during = parser.add_argument_group("evaluations and snapshots during the run")
     others = parser.add_argument_group("other settings")
-    groups = dict.fromkeys(_FIRST, first) | dict.fromkeys(_EVALUATIONS, evaluations)
+    groups = dict.fromkeys(_FIRST, first) | dict.fromkeys(_DURING_THE_RUN, during)
     for spec in fields(Config):
         if spec.name != "preset":
             kind = kind_of(spec)

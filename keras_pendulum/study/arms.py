@@ -131,7 +131,7 @@ def _parse_arm(text: str) -> Arm:
                 f"the arm {name.strip()!r} cannot set {field}: the study's seeds are 0, 1, …, and "
                 "the preset comes before the settings"
             )
-        if field in ("evaluate_every", "keep_best"):
+        if field in ("evaluate_every", "keep_best", "snapshots"):
             raise ConfigError(
                 f"the arm {name.strip()!r} cannot set {field}: a study evaluates each run at its "
                 "end, and saves no weights"

@@ -223,7 +223,7 @@ def config_as_json(config: Config) -> dict[str, Any]:
     """Returns the settings that a run of a study can have, as JSON reads them back."""
     settings = dict(vars(config))  # `asdict` copies deeply, which takes ten times as long
     settings["hidden_units"] = list(config.hidden_units)
-    for name in ("evaluate_every", "keep_best"):  # no arm sets them, see `own_arms`
+    for name in ("evaluate_every", "keep_best", "snapshots"):  # no arm sets them, see `own_arms`
         del settings[name]
     return settings
 

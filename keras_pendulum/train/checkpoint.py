@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import warnings
 from collections.abc import Callable, Iterator
@@ -23,11 +22,12 @@ from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.checksum import write_with_checksum
 from keras_pendulum.storage.keras_h5 import read_layers
 from keras_pendulum.storage.quarantine import H5File, open_h5, report_damage
+from keras_pendulum.storage.run_history import history_arrays, read_history
 from keras_pendulum.storage.weights import changed_versions, encode_weights, require_finite
 from keras_pendulum.train.run import Run, make_run
 
 # A resumed run may change these settings; any other change makes another run.
-_MAY_CHANGE = {"episodes", "save_every", "evaluate_every", "keep_best"}
+_MAY_CHANGE = {"episodes", "save_every", "evaluate_every", "keep_best", "snapshots"}
 
 
 def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
@@ -102,15 +102,8 @@ def _encode(run: Run) -> bytes:
     arrays: dict[str, NDArray[Any]] = {
         # JSON as an array, because an attribute can hold no more than 64 KB.
         "state": np.frombuffer(json.dumps(json_state).encode(), np.uint8),
-        "history": np.array([record[:-1] for record in run.history], np.float64),
+        **history_arrays(run.history),
     }
-    evaluations = [
-        (record.episode, record.greedy_regret)
-        for record in run.history
-        if not math.isnan(record.greedy_regret)
-    ]
-    if evaluations:
-        arrays["evaluations"] = np.array(evaluations, np.float64)
     return encode_weights(
         online,
         online.get_weights(),
@@ -139,7 +132,7 @@ def load_history(path: str | os.PathLike[str]) -> tuple[Config, list[EpisodeReco
     """
     with open_h5(path) as file:
         config = _config(_read_json_state(file, path), path)
-        return config, _read_history(file)
+        return config, read_history(file)
 
 
 def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool = False) -> Run:
@@ -147,8 +140,8 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
 
     Args:
         path: the checkpoint.
-        config: the settings of the run; only `episodes`, `save_every`, `evaluate_every` and
-            `keep_best` may differ.
+        config: the settings of the run; only `episodes`, `save_every`, `evaluate_every`,
+            `keep_best` and `snapshots` may differ.
         render: whether to show the environment in a window.
 
     Raises:
@@ -165,7 +158,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
                     f"{path}: this run has {spec.name} {old}, not {new}: resume it without this "
                     "change, or start another run in another folder"
                 )
-        history = _read_history(file)
+        history = read_history(file)
         if len(history) > config.episodes:
             raise ConfigError(
                 f"{path}: this run has {len(history)} episodes already; episodes is "
@@ -225,16 +218,3 @@ def _arrays(file: H5File, group: str) -> Iterator[tuple[str, NDArray[Any]]]:
     for name in file:
         if name.startswith(f"{group}/"):
             yield name.removeprefix(f"{group}/"), file.read(name)
-
-
-def _read_history(file: H5File) -> list[EpisodeRecord]:
-    rows = file.read("run/history", finite=False)
-    evaluations = file.read("run/evaluations") if "run/evaluations" in file else np.empty((0, 2))
-    regrets = dict(zip(*evaluations.T.tolist(), strict=True))  # by episode
-    integers = {"episode", "environment_steps", "updates"}
-    history = []
-    for row in rows.tolist():
-        values = dict(zip(EpisodeRecord._fields[:-1], row, strict=True))
-        values |= {name: int(values[name]) for name in integers}
-        history.append(EpisodeRecord(**values, greedy_regret=regrets.get(row[0], math.nan)))
-    return history

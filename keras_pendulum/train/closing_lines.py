@@ -146,5 +146,6 @@ def _next_commands(
     commands["Watch it"] = f"evaluate {weights} --episodes 3 --render"
     if TASKS[config.environment].has_torque:
         commands["Play against it"] = f"play --against {weights}"
-        commands["Take it to a browser"] = f"page {weights}"
+        shown = shell_word(folder.path) if folder.snapshots.exists() else weights
+        commands["Take it to a browser"] = f"page {shown}"
     return commands

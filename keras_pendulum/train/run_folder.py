@@ -17,6 +17,7 @@ from keras_pendulum.errors import UserError
 from keras_pendulum.history import EpisodeRecord, csv_header
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.folder_lock import lock_folder
+from keras_pendulum.storage.snapshots import snapshots_file
 
 
 class RunFolder:
@@ -48,8 +49,10 @@ class RunFolder:
         else:
             self.weights = (existing or checkpoints)[0]
         self.best = _best_file(self.weights)
+        self.snapshots = snapshots_file(self.weights)
         others = [file for file in checkpoints if file != self.weights]
-        self._others = [*others, *map(_best_file, others)]  # of a run in another environment
+        # Of a run in another environment.
+        self._others = [*others, *map(_best_file, others), *map(snapshots_file, others)]
         self.history = self._real_path / "history.csv"
         self.config = self._real_path / "config.json"
         self.picture = self._real_path / "rewards.png"
@@ -66,8 +69,12 @@ class RunFolder:
 
     @property
     def files(self) -> list[Path]:
-        """The files that a finished run leaves in the folder; the second only with `keep_best`."""
-        return [self.weights, self.best, self.history, self.config, self.picture]
+        """The files that a finished run leaves in the folder.
+
+        The second is there only with `keep_best`, the third only with `snapshots`.
+        """
+        files = [self.weights, self.best, self.snapshots]
+        return [*files, self.history, self.config, self.picture]
 
     def create(self) -> None:
         """Creates the folder if it does not exist. Raises UserError when that fails."""
@@ -104,7 +111,7 @@ class RunFolder:
 
         Raises UserError when one cannot be removed.
         """
-        _remove(self.best, *self._others)
+        _remove(self.best, self.snapshots, *self._others)
         if events := self._event_files():
             _remove(*events)
             with contextlib.suppress(OSError):  # the folder holds other files too

@@ -24,6 +24,7 @@ from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.reference_returns import reference_returns, run_title
 from keras_pendulum.train.run import Run, make_run
 from keras_pendulum.train.run_folder import RunFolder
+from keras_pendulum.train.snapshots import Snapshots
 
 Phase = Literal["compiling", "evaluating", "drawing"]
 
@@ -60,7 +61,7 @@ def train_dqn(
         render: whether to show the environment in a window, at its own speed.
         overwrite: replaces a run that `out` already holds.
         resume: continues from the checkpoint in `out`; `config` may change only `episodes`,
-            `save_every`, `evaluate_every` and `keep_best`.
+            `save_every`, `evaluate_every`, `keep_best` and `snapshots`.
         listeners: called with the record of each episode.
         on_checkpoint: called with the network and the episode at each checkpoint.
         on_phase: called when another phase than the training begins. A record ends it.
@@ -69,9 +70,9 @@ def train_dqn(
     Raises:
         ConfigError: the settings do not fit `init` or the checkpoint.
         WeightsError: the checkpoint is damaged.
-        UserError: `resume` is combined with `init` or `overwrite`; `keep_best` has no `out`; `out`
-            is in use, cannot be written or is moved meanwhile; or an observation, a reward, a loss
-            or a weight is not finite. The last checkpoint then holds finite weights.
+        UserError: `resume` is combined with `init` or `overwrite`; `keep_best` or `snapshots` has
+            no `out`; `out` is in use, cannot be written or is moved meanwhile; or an observation, a
+            reward, a loss or a weight is not finite. The last checkpoint then holds finite weights.
         TypeError: `config` is no Config, or `init` is no DQN.
     """
     require_type("config", config, Config)
@@ -81,6 +82,8 @@ def train_dqn(
         raise UserError("resume continues a run; init and overwrite start a new one")
     if config.keep_best and out is None:
         raise UserError("keep_best needs `out`, the folder for the best weights")
+    if config.snapshots and out is None:
+        raise UserError("snapshots needs `out`, the folder for the snapshots")
     hooks = _Hooks(list(listeners), on_checkpoint, on_phase, should_stop)
     warn_if_not_reproducible()
     folder = None if out is None else RunFolder(out, config.environment)
@@ -108,8 +111,9 @@ def train_dqn(
             finished = _train(run, hooks)
         else:
             best = BestWeights(folder.best, run.history) if config.keep_best else None
+            snapshots = Snapshots(folder.snapshots, run) if config.snapshots else None
             folder.start_files(config, run.history)
-            finished = _train_in_folder(run, folder, best, hooks)
+            finished = _train_in_folder(run, folder, best, snapshots, hooks)
             if finished:
                 score = _draw(run, folder, hooks)
     return TrainingResult(run.agent.online, run.history, finished, score)
@@ -125,8 +129,14 @@ class _Hooks:
     should_stop: Callable[[], bool]
 
 
-def _train_in_folder(run: Run, folder: RunFolder, best: BestWeights | None, hooks: _Hooks) -> bool:
-    """Trains as `_train` does, and writes history, checkpoints and the best weights."""
+def _train_in_folder(
+    run: Run,
+    folder: RunFolder,
+    best: BestWeights | None,
+    snapshots: Snapshots | None,
+    hooks: _Hooks,
+) -> bool:
+    """Trains as `_train` does, and writes history, checkpoints, best weights and snapshots."""
     config = run.config
     last_saved = -1  # the episode of the last checkpoint
     with CheckpointWriter(folder.weights, folder.require_not_moved) as writer:
@@ -140,6 +150,8 @@ def _train_in_folder(run: Run, folder: RunFolder, best: BestWeights | None, hook
 
         def write_files(record: EpisodeRecord) -> None:
             folder.append(record)
+            if snapshots is not None:
+                snapshots.take_if_due(run, writer)
             is_best = best is not None and best.are_beaten_by(record)
             if is_best or record.episode % config.save_every == 0:
                 save()
@@ -148,6 +160,8 @@ def _train_in_folder(run: Run, folder: RunFolder, best: BestWeights | None, hook
 
         if best is not None and run.history and best.are_beaten_by(run.history[-1]):
             best.write(run, writer)  # the run was killed between the two files
+        if snapshots is not None:
+            snapshots.take_if_due(run, writer)  # the initial network
         finished = _train(run, hooks, write_files)
         if run.history[-1].episode != last_saved:
             save()

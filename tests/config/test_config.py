@@ -39,6 +39,7 @@ LIMITS: dict[str, tuple[float, float]] = {
     "target_period": (1, 1_000_000),
     "save_every": (1, 1_000_000),
     "evaluate_every": (0, 1_000_000),
+    "snapshots": (0, 100),
 }
 
 
@@ -286,6 +287,17 @@ def test_total_updates_without_warmup_counts_every_episode() -> None:
             "reference",
             {"episodes": 9, "evaluate_every": 10},
             "evaluate_every 10 is larger than the run's 9 episodes: make it smaller, or 0",
+        ),
+        ("reference", {"snapshots": 1}, "snapshots is 1; expected 0 for none, or 2 to 100"),
+        (
+            "reference",
+            {"episodes": 9, "snapshots": 11},
+            "snapshots 11 is larger than the run's 9 episodes plus 1: make it smaller, or 0",
+        ),
+        (
+            "reference",
+            {"hidden_units": (8192, 3000), "snapshots": 20},
+            "snapshots and hidden_units make a file of 1.0 GiB; the limit is 1 GiB",
         ),
         ("cartpole", {"keep_best": True}, "keep_best needs evaluate_every: .*--evaluate-every 50"),
         (

@@ -135,10 +135,10 @@ def test_help_lists_the_settings_without_the_old_names(help_lines: dict[str, str
     assert set(help_lines) == {flag(name) for name in SETTINGS}
 
 
-def test_short_help_shows_ten_settings_and_the_evaluations() -> None:
+def test_short_help_shows_ten_settings_and_those_during_the_run() -> None:
     shown = set(flags_in(make_parser().format_help()))
-    assert shown > {"--evaluate-every", "--keep-best"}
-    assert len(shown) == 10 + 2
+    assert shown > {"--evaluate-every", "--keep-best", "--snapshots"}
+    assert len(shown) == 10 + 3
     assert shown >= {"--episodes", "--seed", "--gravity", "--learning-rate", "--hidden-units"}
 
 

@@ -100,6 +100,7 @@ def test_reserved_name_and_its_replacement_are_two_arms_of_one_name() -> None:
         ("a: reference seed=3", "cannot set seed"),
         ("a: reference evaluate_every=50", "cannot set evaluate_every: a study evaluates each run"),
         ("a: reference keep_best=true", "cannot set keep_best"),
+        ("a: reference snapshots=20", "cannot set snapshots"),
         ("reference: original", "two arms have the name"),
         (f"{'n' * 65}: original", "longer than 64 letters"),
     ],

@@ -120,7 +120,7 @@ def test_result_has_no_settings_of_evaluations_during_the_run() -> None:
     # So the results of studies from before these settings are still valid.
     settings = json.loads(encode(PENDULUM, PENDULUM_RESULT))["result"]["config"]
     assert "save_every" in settings
-    assert not {"evaluate_every", "keep_best"} & set(settings)
+    assert not {"evaluate_every", "keep_best", "snapshots"} & set(settings)
 
 
 def test_cartpole_results_at_the_limits_are_valid() -> None:

@@ -149,7 +149,7 @@ OTHER_VALUES: dict[str, Any] = {
 }
 
 
-CHANGEABLE = ("episodes", "save_every", "evaluate_every", "keep_best")
+CHANGEABLE = ("episodes", "save_every", "evaluate_every", "keep_best", "snapshots")
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_resumed_run_can_be_saved_and_evaluated_at_other_episodes(
     run_of_one_episode: tuple[Config, Path],
 ) -> None:
     config, folder = run_of_one_episode
-    other = replace(config, save_every=3, episodes=2, evaluate_every=2, keep_best=True)
+    other = replace(config, save_every=3, episodes=2, evaluate_every=2, keep_best=True, snapshots=2)
     assert load_checkpoint(folder / "pendulum_weight.h5", other).config == other
 
 
@@ -323,13 +323,15 @@ def test_checkpoint_stores_each_variable_under_its_keras_path(tmp_path: Path) ->
             )
 
 
-def test_checkpoint_without_the_settings_of_evaluations_is_resumed(tmp_path: Path) -> None:
+def test_checkpoint_without_the_settings_of_evaluations_and_snapshots_is_resumed(
+    tmp_path: Path,
+) -> None:
     config = kp.preset("original", episodes=3, hidden_units=(8,))
     kp.train_dqn(replace(config, episodes=2), tmp_path)
     with h5py.File(tmp_path / "pendulum_weight.h5", "r+") as file:
         assert "evaluations" not in file["run"]
         state = json.loads(file["run/state"][()].tobytes())
-        for name in ("evaluate_every", "keep_best"):
+        for name in ("evaluate_every", "keep_best", "snapshots"):
             del state["config"][name]
         replace_entry(file, "run/state", np.frombuffer(json.dumps(state).encode(), np.uint8))
     assert_same(kp.train_dqn(config, tmp_path, resume=True), kp.train_dqn(config))

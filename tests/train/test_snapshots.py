@@ -1,0 +1,208 @@
+"""Snapshots of a run: which networks are kept, and that a resumed run keeps the same ones."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from conftest import Command, assert_same
+
+import keras_pendulum as kp
+from keras_pendulum.config.config import Config
+from keras_pendulum.storage.snapshots import Snapshot, read_snapshots
+from keras_pendulum.train.checkpoint import load_history
+from keras_pendulum.train.run_folder import RunFolder
+from keras_pendulum.train.snapshots import Snapshots, due_episodes
+
+FILE = "pendulum_weight_snapshots.h5"
+CONFIG = kp.preset(
+    "reference", episodes=12, snapshots=5, save_every=5, hidden_units=(8,), warmup_episodes=2
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def no_picture() -> Iterator[None]:
+    """Draws nothing."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("keras_pendulum.train.train_dqn.run_phase_planes", lambda *run: {})
+        patched.setattr("keras_pendulum.train.run_figure.draw_run", lambda *run: b"a picture")
+        yield
+
+
+@pytest.fixture(scope="module")
+def whole_run(
+    no_picture: None, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[kp.TrainingResult, Path, dict[int, Any]]:
+    """A run that is not interrupted, its folder, and its weights after each episode."""
+    folder = tmp_path_factory.mktemp("whole")
+    weights: dict[int, Any] = {}
+    config = replace(CONFIG, save_every=1)
+    result = kp.train_dqn(
+        config, folder, on_checkpoint=lambda dqn, i: weights.update({i + 1: dqn.get_weights()})
+    )
+    return result, folder, weights
+
+
+def snapshots_in(folder: Path) -> list[Snapshot]:
+    weights = folder / "pendulum_weight.h5"
+    _, history = load_history(weights)
+    return read_snapshots(folder / FILE, kp.load_weights(weights), history)
+
+
+def test_due_episodes_are_evenly_spaced_from_the_initial_to_the_final_network() -> None:
+    assert due_episodes(5, 12) == [0, 3, 6, 9, 12]
+    assert due_episodes(2, 7) == [0, 7]
+    assert due_episodes(4, 3) == [0, 1, 2, 3]
+
+
+def test_snapshots_are_the_networks_of_the_run(
+    whole_run: tuple[kp.TrainingResult, Path, dict[int, Any]],
+) -> None:
+    result, folder, weights = whole_run
+    found = snapshots_in(folder)
+    assert [each.episodes for each in found] == [0, 3, 6, 9, 12]
+    for each in found[1:]:
+        expected = np.concatenate([array.ravel() for array in weights[each.episodes]])
+        np.testing.assert_array_equal(each.weights, expected.astype(np.float16))
+        assert each.average_reward == result.history[each.episodes - 1].average_reward
+    assert (found[0].weights != found[1].weights).any()
+    newest = kp.load_weights(folder / FILE)
+    for one, two in zip(newest.get_weights(), result.network.get_weights(), strict=True):
+        np.testing.assert_array_equal(one, two)
+
+
+def test_snapshots_change_nothing_in_the_run(
+    whole_run: tuple[kp.TrainingResult, Path, dict[int, Any]],
+) -> None:
+    assert_same(kp.train_dqn(replace(CONFIG, snapshots=0)), whole_run[0])
+
+
+class KilledError(Exception):
+    pass
+
+
+def killed_in(function: Callable[..., Any], call: int) -> Callable[..., Any]:
+    """Returns the function; its given call ends the run."""
+    calls = iter(range(1, 100))
+
+    def wrapped(*arguments: Any) -> Any:
+        if next(calls) == call:
+            raise KilledError
+        return function(*arguments)
+
+    return wrapped
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "call"),
+    [
+        (RunFolder, "append", 5),  # after the snapshot of episode 3, before a checkpoint
+        (RunFolder, "append", 11),
+        (Snapshots, "take_if_due", 1),  # before the initial network is kept
+        (Snapshots, "take_if_due", 7),  # before the snapshot after 6 episodes, with its checkpoint
+    ],
+)
+def test_killed_and_resumed_run_leaves_the_same_file(
+    owner: Any,
+    name: str,
+    call: int,
+    whole_run: tuple[kp.TrainingResult, Path, dict[int, Any]],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with monkeypatch.context() as patched:
+        wrapped = killed_in(getattr(owner, name), call)
+        patched.setattr(owner, name, lambda *arguments: wrapped(*arguments))
+        with pytest.raises(KilledError):
+            kp.train_dqn(CONFIG, tmp_path)
+    resumed = kp.train_dqn(replace(CONFIG, save_every=1), tmp_path, resume=True)
+    assert_same(resumed, whole_run[0])
+    with h5py.File(tmp_path / FILE) as found, h5py.File(whole_run[1] / FILE) as expected:
+        for key in ("episodes", "average_reward", "weights"):
+            np.testing.assert_array_equal(found["snapshots"][key], expected["snapshots"][key])
+
+
+def test_extended_run_keeps_the_networks_nearest_to_the_new_spacing(tmp_path: Path) -> None:
+    config = replace(CONFIG, episodes=4, warmup_episodes=41)
+    kp.train_dqn(config, tmp_path)
+    assert [each.episodes for each in snapshots_in(tmp_path)] == [0, 1, 2, 3, 4]
+    kp.train_dqn(replace(config, episodes=8), tmp_path, resume=True)
+    assert [each.episodes for each in snapshots_in(tmp_path)] == [0, 2, 4, 6, 8]
+    kp.train_dqn(replace(config, episodes=9, snapshots=3), tmp_path, resume=True)
+    assert [each.episodes for each in snapshots_in(tmp_path)] == [0, 4, 9]
+
+
+def test_run_that_asks_later_for_snapshots_begins_with_its_present_network(tmp_path: Path) -> None:
+    config = replace(CONFIG, episodes=2, snapshots=0, warmup_episodes=41)
+    kp.train_dqn(config, tmp_path)
+    assert not (tmp_path / FILE).exists()
+    kp.train_dqn(replace(config, episodes=4, snapshots=3), tmp_path, resume=True)
+    assert [each.episodes for each in snapshots_in(tmp_path)] == [2, 4]
+
+
+@pytest.mark.parametrize("content", ["damaged", "weights alone", "of another run", "other sizes"])
+def test_other_file_in_place_of_the_snapshots_stops_a_resumed_run(
+    content: str, tmp_path: Path
+) -> None:
+    config = replace(CONFIG, episodes=2, snapshots=2, warmup_episodes=41)
+    kp.train_dqn(config, tmp_path / "run")
+    path = tmp_path / "run" / FILE
+    message = {
+        "damaged": "not an HDF5 file",
+        "weights alone": r"holds no snapshots of a run \(train --snapshots N\)",
+        "of another run": "its snapshots are of another run; move it to another folder",
+        "other sizes": "its snapshots have wrong types, sizes or episodes",
+    }[content]
+    if content == "damaged":
+        path.write_bytes(b"damaged")
+    elif content == "weights alone":
+        kp.save_weights(kp.DQN((8,)), path)
+    else:
+        other: dict[str, Any] = {"seed": 1} if content == "of another run" else {}
+        other = other or {"hidden_units": (9,)}
+        kp.train_dqn(replace(config, **other), tmp_path / "other")
+        (tmp_path / "other" / FILE).replace(path)
+    before = {file: file.read_bytes() for file in path.parent.iterdir()}
+    with pytest.raises(kp.WeightsError, match=message) as caught:
+        kp.train_dqn(config, tmp_path / "run", resume=True)
+    assert "\n" not in str(caught.value)
+    assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", [FILE, "cartpole_weight_snapshots.h5"])
+def test_snapshots_of_another_run_are_removed(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).touch()
+    config = replace(CONFIG, episodes=1, snapshots=0)
+    with pytest.raises(kp.UserError, match=rf"already holds a run \({name}\)"):
+        kp.train_dqn(config, tmp_path)
+    kp.train_dqn(config, tmp_path, overwrite=True)
+    assert not (tmp_path / name).exists()
+
+
+def test_snapshots_need_a_folder() -> None:
+    with pytest.raises(kp.UserError, match="snapshots needs `out`"):
+        kp.train_dqn(CONFIG)
+
+
+def test_command_keeps_snapshots_and_names_their_page(in_process: Command, tmp_path: Path) -> None:
+    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "3", "--out", "my run"]
+    done = in_process("train", *words, "--snapshots", "3", "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert FILE in done.stdout
+    assert re.search(
+        r"Take it to a browser: python -m keras_pendulum\.page .my run.\n", done.stdout
+    )
+    assert [each.episodes for each in snapshots_in(tmp_path / "my run")] == [0, 2, 3]
+
+
+def test_20_snapshots_of_the_default_network_have_at_most_8_mb(tmp_path: Path) -> None:
+    config = Config(episodes=19, snapshots=20, max_episode_steps=10, warmup_episodes=41)
+    kp.train_dqn(config, tmp_path)
+    assert len(snapshots_in(tmp_path)) == 20
+    assert (tmp_path / FILE).stat().st_size <= 8_000_000
