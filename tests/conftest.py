@@ -22,6 +22,7 @@ from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environmen
 if TYPE_CHECKING:
     import keras_pendulum as kp
 
+pytest_plugins = ("page_fixtures",)
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
 DATA = TESTS / "data"

@@ -24,10 +24,13 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     """Writes the page as the command line says; returns the exit status."""
     parser = OneLineParser(
         prog=prog,
-        description="Write a page that runs in a browser and shows the network of a weights file.",
+        description="Write a page that runs in a browser and shows the network of a weights file. "
+        "The page of a run with snapshots (train --snapshots N) shows how the network learned.",
     )
     weights = parser.add_argument(
-        "weights", metavar="WEIGHTS.h5", help="a file, or the name of a shipped one"
+        "weights",
+        metavar="WEIGHTS.h5|RUN_FOLDER",
+        help="a file, the name of a shipped one, or the folder of a run",
     )
     against = parser.add_argument(
         "--against", metavar="WEIGHTS.h5", help="a second network, shown beside the first"
@@ -59,18 +62,24 @@ def _write(arguments: argparse.Namespace) -> int:
 
     with fast_import():
         from keras_pendulum.page.build import build_page
+        from keras_pendulum.page.training import find_checkpoint, training_content
         from keras_pendulum.storage.find_weights import find_weights
         from keras_pendulum.storage.weights import load_weights
 
-    path = find_weights(arguments.weights)
+    checkpoint = find_checkpoint(arguments.weights)
+    path = checkpoint or find_weights(arguments.weights)
     network, against = load_weights(path, arguments.activation), None
+    training = training_content(checkpoint, network) if checkpoint else None
+    name = path.resolve().parent.name if checkpoint else None
     if arguments.against is not None:
         other = find_weights(arguments.against)
         against = (load_weights(other), other)
-    page = build_page(network, path, arguments.gravity, against)
+    page = build_page(network, path, arguments.gravity, against, training, name)
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")
+    if checkpoint and not training:
+        print("There is no slider: the run has no snapshots (train --snapshots 20 keeps them)")
     if arguments.open and not webbrowser.open(address):
         raise UserError(f"the browser did not start: open {out} yourself")
     return 0

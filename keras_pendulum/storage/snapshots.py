@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ def snapshots_file(checkpoint: Path) -> Path:
 
 def encode_snapshots(network: DQN, snapshots: Sequence[Snapshot]) -> bytes:
     """Returns the file without its checksum; `network` is the newest one."""
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "episodes": np.array([each.episodes for each in snapshots], np.int64),
         "average_reward": np.array([each.average_reward for each in snapshots], np.float64),
         "weights": np.stack([each.weights for each in snapshots]),
@@ -77,10 +77,10 @@ def read_snapshots(
         episodes, rewards, weights = (
             file.read(f"snapshots/{key}") for key in ("episodes", "average_reward", "weights")
         )
-        types = (episodes.dtype.kind, rewards.dtype.kind, weights.dtype)
+        types = (episodes.dtype.kind, rewards.dtype.kind, weights.dtype.str)
         count = network.count_params()
         if (
-            types != ("i", "f", np.float16)
+            types != ("i", "f", "<f2")
             or episodes.ndim != 1
             or weights.shape != (len(episodes), count)
             or rewards.shape != episodes.shape

@@ -1,10 +1,11 @@
-"""Headless Chromium, and a user of the page in it."""
+"""Headless Chromium, a user of the page in it, and what the user sees."""
 
 from __future__ import annotations
 
 import shutil
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,11 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
+
+from keras_pendulum.page import __main__ as page_command
+
+WEB = Path(page_command.__file__).parent / "web"
+SCREENS = [(1280, 657), (390, 844), (844, 390)]
 
 
 def find_chromium() -> tuple[str, str] | None:
@@ -70,6 +76,13 @@ class Player:
         """Types keys into the element that has the focus."""
         ActionChains(self.driver, duration=0).send_keys(*keys).perform()
 
+    def finger(self, kind: str, place: tuple[float, float], seconds: float) -> None:
+        """Sends a `touchStart`, `touchMove` or `touchEnd` at a time in s."""
+        x, y = place
+        points = [] if kind == "touchEnd" else [{"x": x, "y": y}]
+        event = {"type": kind, "touchPoints": points, "timestamp": seconds}
+        self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
+
     def run(self, script: str, *arguments: Any) -> Any:
         return self.driver.execute_script(script, *arguments)
 
@@ -106,3 +119,15 @@ class Player:
         )
         flat = np.frombuffer(pixels.encode("latin-1"), np.uint8)
         return flat.reshape(-1, width, 4)
+
+
+def pixels_of(player: Player, canvas: str, colour: str) -> NDArray[np.bool_]:
+    """Returns the mask [rows, columns] of the pixels with a colour of the style sheet."""
+    hexadecimal = player.run(f"return pendulum.page.view.colours.{colour}")
+    found = player.picture(canvas)[..., :3] == list(bytes.fromhex(hexadecimal[1:]))
+    return np.asarray(found.all(axis=-1))
+
+
+def shown(total: float) -> str:
+    """Returns a return as the page writes it."""
+    return f"{total:.1f}".replace("-", "−")

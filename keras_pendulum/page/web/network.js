@@ -3,13 +3,11 @@
 /** The Q-network of the weights file: Dense layers, then one linear output for each torque. */
 class Network {
   /**
-   * @param {{sizes: number[], activation: string, weights: string}} recorded sizes of all
-   *   layers, the observation's 3 first; one activation for all hidden layers, or one for each,
-   *   separated by commas; weights as base64 of float32: kernel [in, out] and bias [out] of each
-   *   layer in order.
+   * @param {{sizes: number[], activation: string}} recorded sizes of all layers, the observation's
+   *   3 first; one activation for all hidden layers, or one for each, separated by commas.
+   * @param {Float32Array} numbers the weights: kernel [in, out] and bias [out] of each layer in order.
    */
-  constructor({ sizes, activation, weights }) {
-    const numbers = Network.#decoded(weights);
+  constructor({ sizes, activation }, numbers) {
     const expected = sizes.slice(1).reduce((sum, units, i) => sum + (sizes[i] + 1) * units, 0);
     if (numbers.length !== expected) {
       throw new Error(`it contains ${numbers.length} weights; expected ${expected}`);
@@ -32,11 +30,6 @@ class Network {
   }
 
   static #ACTIVATIONS = { tanh: Math.tanh, relu: (x) => (x > 0 ? x : 0), linear: (x) => x };
-
-  static #decoded(text) {
-    const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-    return new Float32Array(bytes.buffer); // little-endian, like every machine with a browser
-  }
 
   /** Returns the Q-values [A] of an observation [3]; the next call overwrites the array. */
   qValues(observation) {
@@ -68,6 +61,16 @@ class Network {
   torque(theta, thetadot) {
     return this.torques[argmax(this.qValues(observed(theta, thetadot)))];
   }
+}
+
+/** Returns the bytes of a text in base64. */
+function decodedBytes(text) {
+  return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+}
+
+/** Returns the numbers of a text in base64 of float32. */
+function decodedFloats(text) {
+  return new Float32Array(decodedBytes(text).buffer); // little-endian, like every machine with a browser
 }
 
 /** Returns the index of the highest value, the lowest index among equal ones. */

@@ -13,8 +13,7 @@ class Optimum {
    */
   constructor({ rows, columns, scale, table }, gravity) {
     Object.assign(this, { rows, columns, gravity });
-    const bytes = Uint8Array.from(atob(table), (character) => character.charCodeAt(0));
-    const roots = new Uint16Array(bytes.buffer); // little-endian
+    const roots = new Uint16Array(decodedBytes(table).buffer); // little-endian
     if (roots.length !== rows * columns) throw new Error("its table of the optimum has a wrong size");
     this.values = Float32Array.from(roots, (root) => -((root * scale) ** 2));
   }

@@ -1,83 +1,58 @@
 "use strict";
 
-const recorded = JSON.parse(document.getElementById("network").textContent);
 const element = (id) => document.getElementById(id);
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
-const TRAIL = 12; // steps
 const REST = 3; // s between two episodes
 
-/** Returns the names of the networks on the page. */
-function networkNames() {
-  if (!recorded.against) return ["network"];
-  const names = [recorded, recorded.against].map(({ name }) => name.replace(/\.(weights\.)?h5$/, ""));
-  return names[0] === names[1] ? names.map((name, i) => `${name} (${i + 1})`) : names;
-}
-
-/** Returns the text on the network. */
-function about(recorded) {
-  const { name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn } = recorded;
-  const from = preset && !name.startsWith(`${preset}.`) ? ` (preset ${preset})` : "";
-  const sentences = [
-    `${name}${from}, a ${sizes.slice(1, -1).join("-")} ${activation} network with ` +
-      `${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
-  ];
-  const elsewhere = trainedGravity !== null && trainedGravity !== gravity;
-  if (elsewhere) {
-    sentences.push(`Another gravity than in training: it was trained at g = ${trainedGravity} m/s².`);
-  }
-  if (evaluatedReturn !== null) {
-    const where = elsewhere ? " there" : "";
-    sentences.push(`Mean return when evaluated${where}: ${shown(evaluatedReturn, 2)}.`);
-  }
-  return sentences.join(" ");
-}
-
+/** The state of the page and its time. */
 class Page {
-  /** `networks` are one or two; the second is driven from the same starts, in step. */
-  constructor(networks, optimum) {
-    const [network] = networks;
+  /**
+   * @param {object} recorded the content of the page, see build.py.
+   * @param {Network[]} networks one or two; the second is driven from the same starts, in step.
+   * @param {Optimum} optimum
+   * @param {?Training} training the networks that the slider shows in place of the first one.
+   */
+  constructor(recorded, networks, optimum, training) {
+    this.recorded = recorded;
     this.optimum = optimum;
+    this.training = training;
     this.episodes = networks.map((each) => new Episode(each, recorded.gravity));
     [this.episode, this.other] = this.episodes;
-    const policies = [network, networks[1], optimum].map(
-      (policy) => policy && ((theta, thetadot) => policy.torque(theta, thetadot)),
-    );
-    this.policies = policies;
-    this.maps = policies.map((policy) => policy && new TorqueMap(policy));
+    this.maps = [networks[0], networks[1], optimum].map((each) => each && new TorqueMap(each));
     this.layer = 0;
-    this.held = false; // whether a pointer holds the pendulum
-    this.names = networkNames();
+    this.held = false; // whether a pointer or a key holds the pendulum
+    this.heldByKey = false;
+    this.names = networkNames(recorded);
     this.showNames();
     this.restart();
-    // 41 torques are multiples of 0.1 N·m; other counts may need a second digit.
-    this.digits = network.torques.every((u) => Math.abs(u * 10 - Math.round(u * 10)) < 1e-9) ? 1 : 2;
     this.running = !calm.matches;
     this.waiting = 0; // s since the last step
     this.changed = true; // whether anything but `waiting` has changed since the last frame
-    this.recolour();
-    this.listen();
-    this.updateControls();
+    this.view = new View(this);
+    this.controls = new Controls(this);
+    this.controls.update();
+    this.training?.listen((network, map) => this.replaceNetwork(network, map));
     requestAnimationFrame((now) => this.frame(now, now));
   }
 
   /** Takes the steps that are due, 20 per second, and draws. */
   frame(now, before) {
     requestAnimationFrame((later) => this.frame(later, now));
+    const seconds = (now - before) / 1000;
+    this.training?.advance(seconds);
     if (this.running && !this.held) {
       // Limited, so that a tab that was hidden does not rush through the missed steps.
-      this.waiting = Math.min(this.waiting + (now - before) / 1000, 4 * TIME_STEP);
+      this.waiting = Math.min(this.waiting + seconds, 4 * TIME_STEP);
       if (this.episode.over) {
-        this.resting += (now - before) / 1000; // time to read the score
+        this.resting += seconds; // time to read the score
         this.waiting = this.resting < REST ? 0 : TIME_STEP;
       }
       for (; this.waiting >= TIME_STEP; this.waiting -= TIME_STEP) this.step();
     }
-    if (this.changed || (this.running && !calm.matches)) this.drawSwing();
-    if (this.map.work(8)) {
-      this.picture = null;
-      this.changed = true;
-    }
-    if (this.changed) this.drawRest();
+    if (this.changed || (this.running && !calm.matches)) this.view.drawSwing();
+    if (this.map.work(8)) this.changeMap();
+    if (this.changed) this.view.drawRest();
+    this.training?.drawIfChanged(this.view.colours);
     this.changed = false;
   }
 
@@ -101,6 +76,16 @@ class Page {
     this.changed = true;
   }
 
+  /** Shows another network in place of the first one, from the same start. */
+  replaceNetwork(network, map) {
+    this.episode.network = network;
+    this.maps[0] = map;
+    this.changeMap();
+    const { optimalReturn } = this;
+    this.restart(...this.start);
+    this.optimalReturn = optimalReturn;
+  }
+
   /** Shows the returns of the finished episode, of the network too if you drove, and the optimum. */
   showScore() {
     const { episode, other, names, start } = this;
@@ -109,9 +94,9 @@ class Page {
     const driver = helped ? `you and ${names[0]}` : youDrove ? "you" : names[0];
     const parts = [[driver, episode.return]];
     if (youDrove) {
-      const { gravity } = episode;
-      const total = simulatedReturn(gravity, ...start, EPISODE_STEPS, this.policies[0]);
-      parts.push([names[0], total]);
+      const { gravity, network } = episode;
+      const policy = (theta, thetadot) => network.torque(theta, thetadot);
+      parts.push([names[0], simulatedReturn(gravity, ...start, EPISODE_STEPS, policy)]);
     }
     if (other) parts.push([names[1], other.return]);
     const optimal = this.optimalReturn ?? this.optimum.returnFrom(...start);
@@ -140,8 +125,17 @@ class Page {
     for (const button of document.querySelectorAll("[data-layer]")) {
       button.setAttribute("aria-pressed", Number(button.dataset.layer) === layer);
     }
-    this.picture = null;
+    this.changeMap();
+  }
+
+  changeMap() {
+    this.view.picture = null;
     this.changed = true;
+  }
+
+  nextLayer() {
+    const next = (this.layer + 1) % this.maps.length;
+    return this.maps[next] ? next : next + 1;
   }
 
   get map() {
@@ -152,125 +146,8 @@ class Page {
     this.running = running;
     this.waiting = 0;
     this.changed = true;
-    this.updateControls();
-  }
-
-  drive(youDrive) {
-    if (youDrive && !this.episode.youDrive) this.episode.yourTorque = 0;
-    this.episode.youDrive = youDrive;
-    this.changed = true;
-    this.updateControls();
-  }
-
-  choose(torque) {
-    this.drive(true);
-    this.episode.yourTorque = torque;
-    this.updateControls();
-  }
-
-  recolour() {
-    this.colours = readColours();
-    this.picture = null;
-    this.changed = true;
-  }
-
-  /** Updates the buttons and the status line. */
-  updateControls() {
-    const { youDrive, yourTorque } = this.episode;
-    element("take-over").setAttribute("aria-checked", youDrive);
-    for (const button of document.querySelectorAll("[data-torque]")) {
-      const pressed = youDrive && Number(button.dataset.torque) === yourTorque;
-      button.setAttribute("aria-pressed", pressed);
-    }
-    element("pause").firstElementChild.textContent = this.running ? "Pause" : "Play";
-    const network = this.other ? "Both networks drive." : "The network drives.";
-    const driver = youDrive ? "You drive." : network;
-    element("name-0").textContent = youDrive ? "you" : this.names[0];
-    element("status").textContent = this.running ? driver : `Paused. ${driver}`;
-  }
-
-  drawSwing() {
-    this.drawOne(element("pendulum"), this.episode);
-    if (this.other) this.drawOne(element("pendulum-1"), this.other);
-  }
-
-  drawOne(canvas, { path, torque }) {
-    const angles = path.slice(-TRAIL - 1).map(([theta]) => theta);
-    // The drawing is one step behind: it moves from the previous state to the present one.
-    let theta = angles.at(-1);
-    if (this.running && !calm.matches && angles.length > 1) {
-      const share = this.waiting / TIME_STEP;
-      theta = angles.at(-2) + share * (theta - angles.at(-2));
-    }
-    const trail = calm.matches ? [] : [...angles.slice(0, -1), theta];
-    drawPendulum(canvas, this.colours, theta, torque, trail);
-  }
-
-  drawRest() {
-    const { episode, colours } = this;
-    const { torques } = episode.network;
-    element("torque").textContent = shown(episode.torque, this.digits, true);
-    element("reward").textContent = shown(episode.reward, 2);
-    element("return").textContent = shown(episode.return, 1);
-    element("step").textContent = `${episode.steps}/${EPISODE_STEPS}`;
-    element("theta").textContent = shown(wrapped(episode.theta), 2, true);
-    element("thetadot").textContent = shown(episode.thetadot, 2, true);
-    this.episodes.forEach((each, i) => {
-      element(`return-${i}`).textContent = shown(each.return, 1);
-    });
-    if (!this.held) this.optimalReturn ??= this.optimum.returnFrom(...this.start);
-    element("optimum").textContent = this.held ? "–" : shown(this.optimalReturn, 1);
-    const { best, youDrive, yourTorque } = episode;
-    const values = Array.from(episode.qValues, (value) => value / recorded.rewardScale);
-    this.limits = steadyLimits(values, this.limits);
-    const greedy = `${shown(torques[best], this.digits, true)} N·m`;
-    element("best").textContent = `${greedy}: ${shown(values[best], 2)}`;
-    const taken = youDrive ? yourTorque : torques[best];
-    drawBars(element("bars"), colours, torques, values, this.limits, best, taken);
-    this.picture ??= mapPicture(this.map, colours);
-    const paths = this.episodes.map(({ path }) => path);
-    drawPortrait(element("portrait"), colours, this.picture, paths);
-  }
-
-  listen() {
-    const click = (button, act) =>
-      button.addEventListener("click", (event) => {
-        act();
-        // After a click, Space pauses again instead of pressing this button.
-        if (event.detail) button.blur();
-      });
-    click(element("take-over"), () => this.drive(!this.episode.youDrive));
-    click(element("pause"), () => this.pause());
-    click(element("one-step"), () => this.oneStep());
-    click(element("restart"), () => this.restart());
-    for (const button of document.querySelectorAll("[data-torque]")) {
-      const act = () => this.choose(Number(button.dataset.torque));
-      button.addEventListener("pointerdown", act); // when the finger touches, not when it leaves
-      click(button, act);
-    }
-    for (const button of document.querySelectorAll("[data-layer]")) {
-      click(button, () => this.showLayer(Number(button.dataset.layer)));
-    }
-    const touch = new Touch((theta, thetadot, released) => this.put(theta, thetadot, released));
-    touch.listenToPendulum(element("pendulum"));
-    touch.listenToPendulum(element("pendulum-1"));
-    touch.listenToPortrait(element("portrait"));
-    addEventListener("keydown", (event) => this.key(event));
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
-    calm.addEventListener("change", () => this.pause(!calm.matches));
-    const sizes = new ResizeObserver(() => (this.changed = true));
-    document.querySelectorAll("canvas").forEach((canvas) => sizes.observe(canvas));
-  }
-
-  nextLayer() {
-    const next = (this.layer + 1) % this.maps.length;
-    return this.maps[next] ? next : next + 1;
-  }
-
-  /** Puts the pendulum into a state; an episode starts there when the pointer is released. */
-  put(theta, thetadot, released) {
-    this.held = !released;
-    this.restart(theta, thetadot);
+    if (!running) this.training?.stop();
+    this.controls.update();
   }
 
   oneStep() {
@@ -278,48 +155,39 @@ class Page {
     this.step();
   }
 
-  key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const key = event.key.toLowerCase();
-    const torque = { j: -2, arrowleft: -2, k: 0, l: 2, arrowright: 2 }[key];
-    const upOrDown = key === "arrowup" || key === "arrowdown";
-    if (torque !== undefined) this.choose(torque);
-    // Up and down scroll the page unless you drive.
-    else if (upOrDown && this.episode.youDrive) this.choose(0);
-    else if (key === " " && event.target.localName !== "button" && !event.repeat) this.pause();
-    else if (key === "s") this.oneStep();
-    else if (key === "m" && !event.repeat) this.showLayer(this.nextLayer());
-    else if (key === "h" && !event.repeat) this.restart(Math.PI, 0);
-    else if (key === "r" && !event.repeat) this.restart();
-    else if (key === "t" && !event.repeat) this.drive(!this.episode.youDrive);
-    else return;
-    event.preventDefault();
+  /** Plays the training, or stops it. Time runs too, unless the user prefers reduced motion. */
+  playTraining() {
+    if (this.training?.toggle() && !calm.matches) this.pause(true);
   }
-}
 
-try {
-  if (!recorded) throw new Error("it contains no network");
-  const networks = [recorded, recorded.against].filter(Boolean);
-  element("about").textContent = [
-    ...networks.map(about),
-    `Written by keras_pendulum ${recorded.version}.`,
-  ].join(" ");
-  document.title = `Inverted pendulum: ${recorded.name}`;
-  const optimum = new Optimum(recorded.optimum, recorded.gravity);
-  const page = new Page(networks.map((each) => new Network(each)), optimum);
-  /** Access to the page from the console and from tests. */
-  window.pendulum = {
-    page,
-    reset: (theta, thetadot) => page.restart(theta, thetadot),
-    step: () => page.step(),
-    qValues: (observation) => Array.from(page.episode.network.qValues(observation)),
-    state: () => {
-      const { network, path, drivers, ...rest } = page.episode;
-      return { ...rest, qValues: Array.from(rest.qValues), over: page.episode.over };
-    },
-  };
-} catch (error) {
-  element("problem").textContent =
-    `This page is damaged (${error.message}): write it again with python -m keras_pendulum.page.`;
-  element("problem").hidden = false;
+  drive(youDrive) {
+    if (youDrive && !this.episode.youDrive) this.episode.yourTorque = 0;
+    this.episode.youDrive = youDrive;
+    this.changed = true;
+    this.controls.update();
+  }
+
+  choose(torque) {
+    this.drive(true);
+    this.episode.yourTorque = torque;
+    this.controls.update();
+  }
+
+  /** Puts the pendulum into a state; an episode starts there when it is released. */
+  put(theta, thetadot, released, byKey = false) {
+    this.held = !released;
+    this.heldByKey = this.held && byKey;
+    this.restart(theta, thetadot);
+    this.controls.update();
+  }
+
+  /** Releases the pendulum that a key holds. */
+  letGo() {
+    if (this.heldByKey) this.put(...this.start, true);
+  }
+
+  redraw() {
+    this.changed = true;
+    if (this.training) this.training.changed = true;
+  }
 }

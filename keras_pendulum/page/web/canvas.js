@@ -1,0 +1,56 @@
+"use strict";
+
+/** Returns the colours of the style sheet in the present theme, light or dark. */
+function readColours() {
+  const style = getComputedStyle(document.documentElement);
+  const names = ["card", "ink", "soft", "line", "rod", "accent", "minus", "none", "plus", "path"];
+  const colours = Object.fromEntries(
+    [...names, "halo"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
+  );
+  const channels = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
+  const [minus, none, plus] = [colours.minus, colours.none, colours.plus].map(channels);
+  /** Returns red, green and blue of a torque in N·m. */
+  colours.ofTorque = (torque) => {
+    const share = Math.abs(torque) / MAX_TORQUE;
+    const end = torque < 0 ? minus : plus;
+    return none.map((channel, i) => Math.round(channel + share * (end[i] - channel)));
+  };
+  return colours;
+}
+
+/** Clears a canvas at the resolution of the screen; returns its context and its size in CSS pixels. */
+function blank(canvas) {
+  const { clientWidth: width, clientHeight: height } = canvas;
+  const sharpness = window.devicePixelRatio || 1;
+  const [columns, rows] = [Math.round(width * sharpness), Math.round(height * sharpness)];
+  if (canvas.width !== columns || canvas.height !== rows) {
+    canvas.width = columns;
+    canvas.height = rows;
+  }
+  const context = canvas.getContext("2d");
+  context.setTransform(sharpness, 0, 0, sharpness, 0, 0);
+  context.clearRect(0, 0, width, height);
+  context.font = "13px system-ui, sans-serif";
+  context.lineCap = context.lineJoin = "round";
+  return { context, width, height };
+}
+
+function line(context, points) {
+  context.beginPath();
+  points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.stroke();
+}
+
+function write(context, text, x, y, align = "center", baseline = "middle") {
+  context.textAlign = align;
+  context.textBaseline = baseline;
+  context.fillText(text, x, y);
+}
+
+/** Formats a number with a typographic minus sign; `plus` adds the sign of positive numbers. */
+function shown(value, digits, plus = false) {
+  const text = value.toFixed(digits);
+  const zero = Number(text) === 0;
+  if (zero) return text.replace("-", "");
+  return text.replace("-", "−").replace(/^(?=\d)/, plus ? "+" : "");
+}

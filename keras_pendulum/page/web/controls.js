@@ -1,0 +1,105 @@
+"use strict";
+
+const TORQUE_OF_KEY = { j: -2, arrowleft: -2, k: 0, l: 2, arrowright: 2 }; // N·m
+// The directions of θ and θ̇ on the phase portrait.
+const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1] };
+const NUDGE = [0.1, 0.5]; // rad, rad/s
+const FINE_NUDGE = [0.01, 0.1]; // with Shift
+
+/** Connects buttons, keys, pointers and preferences to the page. */
+class Controls {
+  constructor(page) {
+    this.page = page;
+    this.#listenToButtons();
+    this.#listenToPointers();
+    addEventListener("keydown", (event) => this.#key(event));
+    element("portrait").addEventListener("blur", () => page.letGo());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      page.view.recolour();
+      page.redraw();
+    });
+    calm.addEventListener("change", () => page.pause(!calm.matches));
+    const sizes = new ResizeObserver(() => page.redraw());
+    document.querySelectorAll("canvas").forEach((canvas) => sizes.observe(canvas));
+  }
+
+  /** Shows the state of the page in the buttons and the status line. */
+  update() {
+    const { episode, names, running } = this.page;
+    const { youDrive, yourTorque } = episode;
+    element("take-over").setAttribute("aria-checked", youDrive);
+    for (const button of document.querySelectorAll("[data-torque]")) {
+      const pressed = youDrive && Number(button.dataset.torque) === yourTorque;
+      button.setAttribute("aria-pressed", pressed);
+    }
+    element("pause").firstElementChild.textContent = running ? "Pause" : "Play";
+    element("name-0").textContent = youDrive ? "you" : names[0];
+    element("status").textContent = statusText(this.page);
+  }
+
+  #listenToButtons() {
+    const { page } = this;
+    const click = (button, act) =>
+      button.addEventListener("click", (event) => {
+        act();
+        // After a click, Space pauses again instead of pressing this button.
+        if (event.detail) button.blur();
+      });
+    click(element("take-over"), () => page.drive(!page.episode.youDrive));
+    click(element("pause"), () => page.pause());
+    click(element("one-step"), () => page.oneStep());
+    click(element("restart"), () => page.restart());
+    click(element("play-training"), () => page.playTraining());
+    for (const button of document.querySelectorAll("[data-torque]")) {
+      const act = () => page.choose(Number(button.dataset.torque));
+      button.addEventListener("pointerdown", act); // when the finger touches, not when it leaves
+      click(button, act);
+    }
+    for (const button of document.querySelectorAll("[data-layer]")) {
+      click(button, () => page.showLayer(Number(button.dataset.layer)));
+    }
+  }
+
+  #listenToPointers() {
+    const { page } = this;
+    const touch = new Touch((theta, thetadot, released) => page.put(theta, thetadot, released));
+    touch.listenToPendulum(element("pendulum"));
+    touch.listenToPendulum(element("pendulum-1"));
+    touch.listenToPortrait(element("portrait"));
+  }
+
+  #key(event) {
+    const { page } = this;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const key = event.key.toLowerCase();
+    const { id, localName } = event.target;
+    const onButton = localName === "button";
+    const upOrDown = key === "arrowup" || key === "arrowdown";
+    if (localName === "input" && (ARROWS[key] || key === " ")) return; // the slider's own keys
+    if (id === "portrait" && ARROWS[key]) this.#nudge(ARROWS[key], event.shiftKey);
+    else if (page.heldByKey && (key === "enter" || key === " ")) page.letGo();
+    else if (key in TORQUE_OF_KEY) page.choose(TORQUE_OF_KEY[key]);
+    // Up and down scroll the page unless you drive.
+    else if (upOrDown && page.episode.youDrive) page.choose(0);
+    else if (key === " " && !onButton && !event.repeat) page.pause();
+    else if (key === "s") page.oneStep();
+    else if (key === "m" && !event.repeat) page.showLayer(page.nextLayer());
+    else if (key === "h" && !event.repeat) page.restart(Math.PI, 0);
+    else if (key === "r" && !event.repeat) page.restart();
+    else if (key === "t" && !event.repeat) page.drive(!page.episode.youDrive);
+    else if (key === "p" && !event.repeat) page.playTraining();
+    else return;
+    event.preventDefault();
+  }
+
+  /** Moves the pendulum by a step of the keyboard and holds it there. */
+  #nudge(direction, fine) {
+    const { theta, thetadot } = this.page.episode;
+    const [angle, speed] = [wrapped(theta), thetadot].map((value, i) => {
+      if (!direction[i]) return value;
+      const step = (fine ? FINE_NUDGE : NUDGE)[i];
+      return (Math.round(value / step) + direction[i]) * step;
+    });
+    this.page.put(wrapped(angle), clipped(speed, MAX_SPEED), false, true);
+  }
+}

@@ -1,0 +1,33 @@
+"use strict";
+
+const HALF_THUMB = 8; // px, of the slider below the curve
+
+/** Returns the value of a curve of evenly spaced points at a share of its length. */
+function curveValue(curve, share) {
+  return curve[Math.round(share * (curve.length - 1))];
+}
+
+/** Draws the learning curve, and a cursor at the episode `here`. */
+function drawCurve(canvas, colours, curve, here, end) {
+  const { context, width, height } = blank(canvas);
+  const [left, right, top, bottom] = [HALF_THUMB, width - HALF_THUMB, 4, height - 4];
+  const [lowest, highest] = [Math.min(...curve), Math.max(...curve)];
+  const x = (share) => left + share * (right - left);
+  const y = (value) => bottom - ((value - lowest) / (highest - lowest || 1)) * (bottom - top);
+
+  context.fillStyle = colours.soft;
+  context.font = "11px system-ui, sans-serif";
+  const room = 4; // px between a number and the edge
+  write(context, shown(highest, 1), left + room, top, "left", "top");
+  write(context, `${shown(lowest, 1)} a step`, right, bottom, "right", "bottom");
+  context.strokeStyle = colours.accent;
+  context.lineWidth = 2;
+  line(context, curve.map((value, i) => [x(i / (curve.length - 1 || 1)), y(value)]));
+  context.strokeStyle = context.fillStyle = colours.ink;
+  context.lineWidth = 1.5;
+  const cursor = x(here / end);
+  line(context, [[cursor, 0], [cursor, height]]);
+  context.beginPath();
+  context.arc(cursor, y(curveValue(curve, here / end)), 4, 0, 2 * Math.PI);
+  context.fill();
+}

@@ -1,0 +1,96 @@
+"use strict";
+
+/** Returns the torque map as a picture with one pixel per cell. */
+function mapPicture(map, colours) {
+  const picture = document.createElement("canvas");
+  picture.width = picture.height = map.size;
+  const context = picture.getContext("2d");
+  const image = context.createImageData(map.size, map.size);
+  map.torques.forEach((torque, i) => image.data.set([...colours.ofTorque(torque), 255], 4 * i));
+  context.putImageData(image, 0, 0);
+  return picture;
+}
+
+/** Returns the edges of the map in a canvas: left, right, top, bottom. */
+function portraitEdges(width, height) {
+  return [46, width - 10, 8, height - 40];
+}
+
+/** Draws the phase plane: the map, and the paths of [θ, θ̇] over it, the second one dashed. */
+function drawPortrait(canvas, colours, picture, paths) {
+  const { context, width, height } = blank(canvas);
+  const [left, right, top, bottom] = portraitEdges(width, height);
+  const x = (theta) => left + ((theta / Math.PI + 1) / 2) * (right - left);
+  const y = (thetadot) => top + ((1 - thetadot / MAX_SPEED) / 2) * (bottom - top);
+
+  context.save();
+  context.beginPath();
+  context.rect(left, top, right - left, bottom - top);
+  context.clip();
+  // The centres of the outer cells lie on the edges.
+  const [cellX, cellY] = [(right - left) / (picture.width - 1), (bottom - top) / (picture.height - 1)];
+  context.imageSmoothingEnabled = false;
+  context.drawImage(
+    picture,
+    left - cellX / 2,
+    top - cellY / 2,
+    right - left + cellX,
+    bottom - top + cellY,
+  );
+  paths.forEach((path, i) => {
+    for (const [colour, thickness] of [[colours.halo, 4.5], [colours.path, 2]]) {
+      context.strokeStyle = colour;
+      context.lineWidth = thickness;
+      context.setLineDash(i && colour === colours.path ? [5, 5] : []);
+      continuous(path).forEach((part) => line(context, part.map(([a, b]) => [x(a), y(b)])));
+    }
+  });
+  context.restore();
+  context.strokeStyle = colours.soft;
+  context.lineWidth = 1;
+  context.strokeRect(left, top, right - left, bottom - top);
+
+  // The second network's circle is hollow, and below the first one's.
+  for (const [i, path] of [...paths.entries()].reverse()) {
+    const [theta, thetadot] = path.at(-1);
+    [context.fillStyle, context.strokeStyle] = [colours.path, colours.halo];
+    if (i) [context.fillStyle, context.strokeStyle] = [colours.halo, colours.path];
+    context.lineWidth = 2.5;
+    context.beginPath();
+    context.arc(x(wrapped(theta)), y(thetadot), i ? 8 : 6.5, 0, 2 * Math.PI);
+    context.fill();
+    context.stroke();
+  }
+
+  context.fillStyle = colours.soft;
+  ["−π", "−π/2", "0", "π/2", "π"].forEach((text, i) => {
+    write(context, text, left + (i / 4) * (right - left), bottom + 13);
+  });
+  write(context, "angle θ (rad), 0 upright", (left + right) / 2, bottom + 31);
+  for (const value of [-8, -4, 0, 4, 8]) {
+    const inside = clipped(y(value) - (top + bottom) / 2, (bottom - top) / 2 - 4);
+    write(context, shown(value, 0), left - 6, inside + (top + bottom) / 2, "right");
+  }
+  context.translate(12, (top + bottom) / 2);
+  context.rotate(-Math.PI / 2);
+  write(context, "velocity θ̇ (rad/s)", 0, 0);
+}
+
+/** Splits the path where it jumps from π to -π; both parts continue beyond the edge. */
+function continuous(path) {
+  const parts = [];
+  let part = [];
+  let shift = 0;
+  for (const [theta, thetadot] of path) {
+    const here = wrapped(theta) - theta;
+    if (part.length && Math.abs(here - shift) > 1) {
+      const [before, speed] = part.at(-1);
+      part.push([theta + shift, thetadot]);
+      parts.push(part);
+      part = [[before - shift + here, speed]];
+    }
+    shift = here;
+    part.push([theta + here, thetadot]);
+  }
+  return [...parts, part];
+}

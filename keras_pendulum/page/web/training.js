@@ -1,0 +1,117 @@
+"use strict";
+
+const SECONDS_PER_NETWORK = 3; // while the training plays
+const BASE64 = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+const SIX_BITS = new Uint8Array(128); // by the code of the character
+[...BASE64].forEach((character, i) => (SIX_BITS[character.charCodeAt(0)] = i));
+
+/** The networks of a training, and the slider, the curve and the button that move through them. */
+class Training {
+  /**
+   * @param {object} recorded the content of the page. Its `training` has `episodes`, after which
+   *   the networks were kept; `curve`, the rewards of a step at even distances from the first to the
+   *   last episode; and `networks`, all but the last one.
+   * @param {Network} last the network after the last of the episodes.
+   */
+  constructor(recorded, last) {
+    const { episodes, curve, networks } = recorded.training;
+    Object.assign(this, { recorded, episodes, curve });
+    if (networks.length !== episodes.length - 1) throw new Error("a network of its training is missing");
+    this.shown = networks.length;
+    this.playing = false;
+    this.seconds = 0; // since the present network is shown, while playing
+    this.changed = true; // whether the curve must be drawn again
+    // Decoded when they are shown for the first time, with their torque maps.
+    this.cache = [];
+    this.cache[this.shown] = { network: last, map: new TorqueMap(last) };
+  }
+
+  /** Starts to listen to the slider; `replace` is called with each network and its torque map. */
+  listen(replace) {
+    this.replace = replace;
+    const slider = element("snapshot");
+    slider.max = this.episodes.length - 1;
+    slider.addEventListener("input", () => {
+      this.stop();
+      this.show(Number(slider.value));
+    });
+    document.body.classList.add("with-training");
+    for (const each of document.querySelectorAll("[data-training]")) each.hidden = false;
+    this.#showTexts();
+  }
+
+  /** Shows the network of an index: map, Q-values and behaviour follow it. */
+  show(index) {
+    if (index === this.shown) return;
+    this.shown = index;
+    this.seconds = 0;
+    this.cache[index] ??= this.#decoded(index);
+    this.replace(this.cache[index].network, this.cache[index].map);
+    this.#showTexts();
+  }
+
+  /** Starts or stops the play, at the end from the first network on; returns whether it plays. */
+  toggle() {
+    const start = !this.playing;
+    if (start && this.shown === this.episodes.length - 1) this.show(0);
+    this.seconds = 0;
+    this.playing = start;
+    this.#showTexts();
+    return start;
+  }
+
+  stop() {
+    if (this.playing) this.toggle();
+  }
+
+  /** Lets time pass; shows the next network when it is due. */
+  advance(seconds) {
+    if (!this.playing) return;
+    // Limited, so that a tab that was hidden does not rush through the training.
+    this.seconds += Math.min(seconds, 4 * TIME_STEP);
+    if (this.seconds < SECONDS_PER_NETWORK) return;
+    if (this.shown === this.episodes.length - 1) this.stop();
+    else this.show(this.shown + 1);
+  }
+
+  drawIfChanged(colours) {
+    if (!this.changed) return;
+    this.changed = false;
+    drawCurve(element("curve"), colours, this.curve, this.episodes[this.shown], this.episodes.at(-1));
+  }
+
+  #showTexts() {
+    const [here, end] = [this.episodes[this.shown], this.episodes.at(-1)];
+    const slider = element("snapshot");
+    slider.value = this.shown;
+    slider.setAttribute("aria-valuetext", `episode ${here} of ${end}`);
+    const reward = curveValue(this.curve, here / end);
+    element("training-text").textContent = `episode ${here} of ${end}: reward ${shown(reward, 2)} a step`;
+    element("play-training").firstElementChild.textContent = this.playing ? "Stop" : "Play training";
+    this.changed = true;
+  }
+
+  /** Returns a network and its map. Each kernel weight is 12 bits, times a factor of its unit. */
+  #decoded(index) {
+    const { kernels, floats } = this.recorded.training.networks[index];
+    const { sizes } = this.recorded;
+    const [factorsAndBiases, weights] = [decodedFloats(floats), []];
+    let [place, start] = [0, 0];
+    for (let layer = 1; layer < sizes.length; layer++) {
+      const [inputs, units] = [sizes[layer - 1], sizes[layer]];
+      const factors = factorsAndBiases.subarray(start, start + units);
+      const kernel = new Float32Array(inputs * units);
+      for (let i = 0; i < kernel.length; i++, place += 2) {
+        const high = SIX_BITS[kernels.charCodeAt(place)];
+        const low = SIX_BITS[kernels.charCodeAt(place + 1)];
+        kernel[i] = (64 * high + low - 2048) * factors[i % units];
+      }
+      weights.push(kernel, factorsAndBiases.subarray(start + units, start + 2 * units));
+      start += 2 * units;
+    }
+    const numbers = new Float32Array(weights.reduce((sum, { length }) => sum + length, 0));
+    weights.reduce((sum, each) => (numbers.set(each, sum), sum + each.length), 0);
+    const network = new Network(this.recorded, numbers);
+    return { network, map: new TorqueMap(network) };
+  }
+}

@@ -1,0 +1,37 @@
+"use strict";
+
+/** Returns the names of the networks on the page. */
+function networkNames(recorded) {
+  if (!recorded.against) return ["network"];
+  const names = [recorded, recorded.against].map(({ name }) => name.replace(/\.(weights\.)?h5$/, ""));
+  return names[0] === names[1] ? names.map((name, i) => `${name} (${i + 1})`) : names;
+}
+
+/** Returns the text on a network. */
+function about({ name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn }) {
+  const from = preset && !name.startsWith(`${preset}.`) ? ` (preset ${preset})` : "";
+  const sentences = [
+    `${name}${from}, a ${sizes.slice(1, -1).join("-")} ${activation} network with ` +
+      `${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
+  ];
+  const elsewhere = trainedGravity !== null && trainedGravity !== gravity;
+  if (elsewhere) {
+    sentences.push(`Another gravity than in training: it was trained at g = ${trainedGravity} m/s².`);
+  }
+  if (evaluatedReturn !== null) {
+    const where = elsewhere ? " there" : "";
+    sentences.push(`Mean return when evaluated${where}: ${shown(evaluatedReturn, 2)}.`);
+  }
+  return sentences.join(" ");
+}
+
+/** Returns the status: who drives, and whether time is paused or the pendulum is held. */
+function statusText({ episode, other, running, heldByKey }) {
+  if (heldByKey) {
+    const [theta, thetadot] = [wrapped(episode.theta), episode.thetadot];
+    return `Held at ${shown(theta, 2)} rad, ${shown(thetadot, 2)} rad/s. Enter lets go.`;
+  }
+  const networks = other ? "Both networks drive." : "The network drives.";
+  const driver = episode.youDrive ? "You drive." : networks;
+  return running ? driver : `Paused. ${driver}`;
+}

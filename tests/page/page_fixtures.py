@@ -1,0 +1,106 @@
+"""Fixtures of the page: its files, its pages and a user in a browser.
+
+`tests/conftest.py` loads this module for every test, so its fixtures import what they need.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import keras_pendulum as kp
+
+if TYPE_CHECKING:
+    from browser import Player
+    from selenium import webdriver
+
+
+@pytest.fixture(scope="session")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Weights files by name: two shipped ones, and a small one with other sizes and settings."""
+    from keras_pendulum.dqn.network import Provenance
+
+    small = kp.DQN(
+        (24, 7), 16, activation="relu", provenance=Provenance(gravity=3.5, preset="mine")
+    )
+    random = np.random.RandomState(0)
+    small.set_weights([random.normal(size=w.shape) for w in small.get_weights()])
+    # Characters with a meaning in HTML.
+    path = tmp_path_factory.mktemp("files") / "<!--<script>&.h5"
+    kp.save_weights(small, path)
+    return {
+        "reference": kp.find_weights("reference"),
+        "swingup": kp.find_weights("swingup"),
+        "small": path,
+    }
+
+
+class _Pages(dict[str, str]):
+    """The addresses of pages by name; a page is written when it is used for the first time."""
+
+    def __init__(self, files: dict[str, Path], folder: Path) -> None:
+        self._files, self._folder = files, folder
+
+    def __missing__(self, name: str) -> str:
+        from keras_pendulum.page import __main__ as page_command
+        from keras_pendulum.page import build
+
+        out = self._folder / f"{name}.html"
+        with pytest.MonkeyPatch.context() as patched:
+            if name == "small":  # no test needs its exact optimum
+                patched.setattr(build, "THETA_CELLS", 50)
+            assert page_command.main([str(self._files[name]), "--out", str(out)]) == 0
+        self[name] = out.as_uri()
+        return self[name]
+
+
+@pytest.fixture(scope="session")
+def pages(files: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The addresses of the pages of `files`."""
+    return _Pages(files, tmp_path_factory.mktemp("pages"))
+
+
+@pytest.fixture(scope="session")
+def duel(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The address of a page with two networks."""
+    from keras_pendulum.page import __main__ as page_command
+
+    out = tmp_path_factory.mktemp("duel") / "page.html"
+    command = ["reference", "--against", "original", "--out", str(out)]
+    assert page_command.main(command) == 0
+    assert out.stat().st_size < 2_500_000
+    return out.as_uri()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[webdriver.Chrome]:
+    """A browser; without one the tests are skipped, but fail in CI."""
+    from browser import find_chromium, start
+
+    paths = find_chromium()
+    if paths is None:
+        reason = "no Chromium with its chromedriver here: install chromium and chromium-driver"
+        if os.environ.get("CI"):
+            pytest.fail(reason, pytrace=False)
+        pytest.skip(reason)
+    driver = start(*paths)
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture
+def player(chromium: webdriver.Chrome) -> Iterator[Player]:
+    """A user with a large screen; fails when the browser has logged an error."""
+    from browser import Player
+
+    player = Player(chromium)
+    player.set_screen(1280, 800)
+    player.log("browser")
+    player.log("performance")
+    yield player
+    assert player.log("browser") == []

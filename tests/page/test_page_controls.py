@@ -1,0 +1,167 @@
+"""Buttons and keys of the page, its time and its score."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from browser import Player, shown
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.keys import Keys
+
+
+def test_switch_takes_over_and_torque_acts_until_the_next_choice(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    switch = player.find("take-over")
+    assert (switch.aria_role, switch.get_attribute("aria-checked")) == ("switch", "false")
+    assert player.text("status") == "The network drives."
+    switch.click()
+    assert switch.get_attribute("aria-checked") == "true"
+    assert player.text("status") == "You drive."
+    assert player.button(0).get_attribute("aria-pressed") == "true"
+    player.press("j")
+    start = player.state()["steps"]
+    player.wait(lambda: player.state()["steps"] > start + 5)
+    assert player.state()["torque"] == -2
+    assert player.text("torque") == "−2.00"
+    assert player.button(-2).get_attribute("aria-pressed") == "true"
+    assert player.button(0).get_attribute("aria-pressed") == "false"
+    player.button(2).click()
+    player.wait(lambda: player.state()["torque"] == 2)
+    player.press("t")
+    assert player.text("status") == "The network drives."
+    assert player.button(2).get_attribute("aria-pressed") == "false"
+    player.press(Keys.SPACE)
+    best = player.run("return pendulum.page.episode.network.torques[pendulum.state().best]")
+    player.press("s")
+    assert player.state()["torque"] == best
+    player.press("t")  # taking over again starts without torque
+    assert player.button(0).get_attribute("aria-pressed") == "true"
+    player.press("s")
+    assert player.state()["torque"] == 0
+
+
+def test_touching_a_torque_takes_over_at_once(pages: dict[str, str], player: Player) -> None:
+    player.set_screen(390, 844)
+    player.open(pages["small"])
+    finger = ActionChains(player.driver, duration=0)
+    finger.move_to_element(player.button(-2)).click_and_hold().perform()
+    assert player.text("status") == "You drive."
+    assert player.button(-2).get_attribute("aria-pressed") == "true"
+    finger.release().perform()
+    player.wait(lambda: player.state()["torque"] == -2)
+
+
+def test_time_runs_at_20_steps_per_second_and_pauses_and_restarts(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press("r")
+    player.wait(lambda: player.state()["steps"] > 0)
+    # On a busy machine a single measurement may be too low.
+    rates = [steps_per_second(player) for _ in range(3)]
+    assert any(rate == pytest.approx(20, rel=0.1) for rate in rates), rates
+    player.find("pause").click()
+    assert player.text("status") == "Paused. The network drives."
+    assert player.text("pause").startswith("Play")
+    still = player.state()["steps"]
+    time.sleep(0.3)
+    assert player.state()["steps"] == still
+    player.find("one-step").click()
+    assert player.state()["steps"] == still + 1
+    player.find("restart").click()
+    player.wait(lambda: player.text("step") == "0/200")
+    assert player.text("return") == "0.0"
+    player.press(Keys.SPACE)  # no clicked button has the focus and takes the key
+    player.wait(lambda: player.state()["steps"] > 3)
+
+
+def steps_per_second(player: Player) -> float:
+    count = "return [pendulum.state().steps, performance.now()]"
+    first, start = player.run(count)
+    player.wait(lambda: player.state()["steps"] >= first + 16)
+    last, end = player.run(count)
+    return float(1000 * (last - first) / (end - start))
+
+
+def test_new_random_start_follows_the_last_step(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(1, 0); for (let i = 0; i < 199; i++) pendulum.step()")
+    player.press("t", "s")
+    player.wait(lambda: player.text("step") == "200/200")
+    total = player.state()["return"]
+    assert player.text("score").startswith(f"Score: you and network {shown(total)} · network −")
+    starts = []
+    for _ in range(20):
+        player.run("pendulum.reset(); for (let i = 0; i < 200; i++) pendulum.step()")
+        player.press("s")
+        starts.append(player.state())
+    assert {start["steps"] for start in starts} == {0}
+    angles = [start["theta"] for start in starts]
+    speeds = [start["thetadot"] for start in starts]
+    assert -np.pi <= min(angles) < -1 < 1 < max(angles) <= np.pi
+    assert -1 <= min(speeds) < -0.3 < 0.3 < max(speeds) <= 1
+
+
+def test_score_stays_while_time_runs_on(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(1, 0); for (let i = 0; i < 198; i++) pendulum.step()")
+    assert player.text("score") == "The score comes after 200 steps."
+    player.press(Keys.SPACE)
+    player.wait(lambda: player.state()["over"])
+    score = player.text("score")
+    assert score.startswith("Score: network −")
+    player.wait(lambda: player.state()["steps"] == 1)  # the next episode, after a rest
+    assert player.text("score") == score
+
+
+def test_score_has_the_network_from_your_start(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    episode = "pendulum.reset(1, 0); for (let i = 0; i < 200; i++) pendulum.step()"
+    player.run(episode)
+    network = player.state()["return"]
+    player.press("l")
+    player.run(episode)
+    you = player.state()["return"]
+    assert you < network
+    assert player.text("score").startswith(f"Score: you {shown(you)} · network {shown(network)} · ")
+
+
+def test_tab_focuses_every_control_in_order_with_an_outline(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    order = []
+    for _ in range(9):
+        player.press(Keys.TAB)
+        order.append(player.focus())
+        outline = "getComputedStyle(document.activeElement).outline"
+        assert "solid 3px" in player.run(f"return {outline}")
+    assert order == ["take-over", "pause", "one-step", "restart", "-2", "0", "2", "0", "2"]
+    player.press(Keys.SPACE)  # the button's own key, not the pause
+    assert player.text("status") == "The network drives."
+    assert player.run("return pendulum.page.layer") == 2
+    player.press(Keys.TAB)
+    assert player.focus() == "portrait"
+    player.find("take-over").send_keys(Keys.ENTER)
+    assert player.text("status") == "You drive."
+    player.button(2).send_keys(Keys.SPACE)
+    player.wait(lambda: player.state()["torque"] == 2)
+    keys = ActionChains(player.driver, duration=0)
+    keys.key_down(Keys.CONTROL).send_keys("j").key_up(Keys.CONTROL).perform()
+    assert player.button(2).get_attribute("aria-pressed") == "true"  # the browser's own shortcut
+
+
+def test_page_starts_paused_for_reduced_motion(pages: dict[str, str], player: Player) -> None:
+    player.set_screen(1280, 800, **{"reduced-motion": "reduce"})
+    player.open(pages["small"])
+    assert player.text("status") == "Paused. The network drives."
+    assert player.state()["steps"] == 0
+    player.press(Keys.SPACE)
+    player.wait(lambda: player.state()["steps"] > 2)

@@ -1,0 +1,103 @@
+"""What the page draws: pendulum, bars and axes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import Player, pixels_of
+from numpy.typing import NDArray
+from selenium.webdriver.common.keys import Keys
+
+import keras_pendulum as kp
+from keras_pendulum.environments.tasks import make_environment
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.8, -2.0, 3.0])
+def test_pendulum_points_where_gymnasium_draws_it(
+    theta: float, pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(arguments[0], 0)", theta)
+    rod = pixels_of(player, "pendulum", "rod")
+    env: Any = make_environment("Pendulum-v1", 1.0, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.unwrapped.state = np.array([theta, 0.0])
+    gymnasium_rod = (env.render() == [204, 77, 77]).all(axis=-1)
+    env.close()
+    assert direction(rod) == pytest.approx(direction(gymnasium_rod), abs=0.05)
+
+
+def direction(mask: NDArray[np.bool_]) -> complex:
+    """Returns the unit vector from the centre of a mask to the mean of its marked pixels."""
+    rows, columns = np.nonzero(mask)
+    middle = complex(columns.mean() - mask.shape[1] / 2, mask.shape[0] / 2 - rows.mean())
+    return middle / abs(middle)
+
+
+@pytest.mark.parametrize(("key", "side"), [("l", 1), ("j", -1)])
+def test_arrow_of_a_positive_torque_turns_counter_clockwise(
+    key: str, side: int, pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(0, 0)")
+    player.press(key, "s")
+    arrow = pixels_of(player, "pendulum", "plus" if side > 0 else "minus")
+    # The arrow is below the pivot: its wide head is on the right if it turns counter-clockwise.
+    columns = np.nonzero(arrow)[1] - arrow.shape[1] / 2
+    assert side * columns.mean() > 1
+
+
+def test_every_torque_has_a_bar_and_the_highest_is_the_greedy_one(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["swingup"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(2, 1)")
+    state = player.state()
+    picture = player.picture("bars")
+    left, right = 76, picture.shape[1] - 6
+    middles = left + (np.arange(41) + 0.5) * (right - left) / 41
+    tops = np.array([np.nonzero(picture[13:, round(m), 3])[0][0] for m in middles])
+    q = np.array(state["qValues"])
+    assert state["best"] == q.argmax()
+    assert tops[state["best"]] == tops.min()  # another bar may have the same height in pixels
+    lowest, highest = player.run("return pendulum.page.view.limits")
+    scale = reward_scale(kp.find_weights("swingup"))
+    heights = (q / scale - lowest) / (highest - lowest)
+    floor = picture.shape[0] - 38 - 4 - 13  # a bar for the lowest value has 4 px
+    np.testing.assert_allclose(1 - (tops + 1) / (floor + 1), heights, atol=0.03)
+    value = player.text("best").split(": ")[1].replace("−", "-")
+    assert float(value) == pytest.approx(
+        q.max() / reward_scale(kp.find_weights("swingup")), abs=0.01
+    )
+
+
+def reward_scale(path: Path) -> float:
+    """Returns the factor on the rewards in the settings that a weights file records."""
+    config = json.loads(kp.load_weights(path).provenance.config or "{}")
+    return float(config["reward_scale"])
+
+
+def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+
+    def limits(low: float, high: float, before: list[float] | None) -> list[float]:
+        found: list[float] = player.run(
+            "return steadyLimits([arguments[0], arguments[1]], arguments[2])", low, high, before
+        )
+        return found
+
+    assert limits(-13.2, -2.4, None) == [-15, 0]
+    assert limits(-11, -8, [-15, 0]) == [-15, 0]
+    assert limits(-11, -8.5, [-15, 0]) == [-11, -8]
+    assert limits(-15.1, -2.4, [-15, 0]) == [-20, 0]
+    low, high = limits(-1, -1, None)  # equal values need an axis too
+    assert low <= -1 <= high and low < high

@@ -1,0 +1,116 @@
+"""The page on screens of several sizes, in light and dark."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from browser import WEB, Player
+from selenium.webdriver.common.keys import Keys
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player: Player) -> None:
+    colour = {"color-scheme": theme}
+    player.set_screen(360, 740, **colour)
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(3, -8); pendulum.page.episode.return = -1234.56")
+    player.run("for (let i = 0; i < 200; i++) pendulum.step()")  # a last episode of four digits
+    player.press("t")
+    player.wait(lambda: player.text("score").startswith("Score: network −"))
+    for width, height in ((320, 568), (360, 740), (390, 844), (600, 900), (844, 390), (960, 600)):
+        player.set_screen(width, height, **colour)
+        overhang = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        assert player.run(f"return [innerWidth, {overhang}]") == [width, 0]
+        cut = player.run(
+            "return [...document.querySelectorAll('main *')].filter(e =>"
+            "  e.getBoundingClientRect().right > document.documentElement.clientWidth ||"
+            "  e.localName !== 'canvas' && getComputedStyle(e).display !== 'inline' &&"
+            "  e.scrollWidth > e.clientWidth + 1"
+            ").map(e => e.outerHTML)"
+        )
+        assert cut == [], width
+        low = player.run(
+            "return Math.min(...[...document.querySelectorAll('button')]"
+            ".filter(e => e.offsetParent).map(e => e.clientHeight))"
+        )
+        assert low >= 42  # px, plus the border: large enough for a finger
+        canvases = player.run(
+            "return [...document.querySelectorAll('canvas')].filter(c => c.offsetParent)"
+            ".map(c => Math.min(c.clientWidth, c.clientHeight))"
+        )
+        assert min(canvases) >= 120
+    player.set_screen(360, 740, **colour)
+    widths = (
+        "return [...document.querySelectorAll('canvas')].filter(c => c.offsetParent)"
+        ".map(c => c.width / c.clientWidth)"
+    )
+    player.wait(lambda: set(player.run(widths)) == {2})  # as sharp as the screen
+    dark = player.run("return getComputedStyle(document.body).backgroundColor") == "rgb(15, 19, 25)"
+    assert dark == (theme == "dark")
+
+
+@pytest.mark.parametrize("page", ["one", "two"])
+@pytest.mark.parametrize(
+    ("width", "height", "visible"),
+    [
+        (1280, 657, ("#swing", "#values", "#phase", ".legend", "#about")),
+        (390, 844, ("#pair", "#score", "#phase", ".legend", "#take-over")),
+        (844, 390, ("#swing", "#pair", "#readings", "#score", ".torques")),
+    ],
+)
+def test_first_screen_shows_what_belongs_together(
+    page: str,
+    width: int,
+    height: int,
+    visible: tuple[str, ...],
+    pages: dict[str, str],
+    duel: str,
+    player: Player,
+) -> None:
+    player.set_screen(width, height)
+    player.open(duel if page == "two" else pages["reference"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(2, 0); for (let i = 0; i < 200; i++) pendulum.step()")
+    for selector in visible:
+        top, bottom, wide = player.run(
+            "const e = [...document.querySelectorAll(arguments[0])]"
+            ".flatMap(e => e.getClientRects().length ? [e] : [...e.children])"
+            ".map(e => e.getBoundingClientRect());"
+            "return [Math.min(...e.map(r => r.top)), Math.max(...e.map(r => r.bottom)),"
+            "  Math.max(...e.map(r => r.width))]",
+            selector,
+        )
+        assert top >= 0 and bottom <= height and wide > 0, selector
+    end = player.run("return document.documentElement.scrollHeight")
+    if width == 1280:
+        assert end <= height  # nothing to scroll to
+
+
+def test_light_and_dark_theme_have_enough_contrast() -> None:
+    text = (WEB / "pendulum.css").read_text(encoding="utf-8")
+    light, dark = (
+        dict(re.findall(r"--(\w+): (#\w{6})", block))
+        for block in re.findall(r":root {(.*?)}", text, re.S)
+    )
+    assert light.keys() == dark.keys()
+    for colours in (light, dark):
+        for ink in ("ink", "soft", "accent", "problem"):
+            for ground in ("card", "paper"):
+                assert contrast(colours[ink], colours[ground]) >= 4.5  # WCAG 2.2, level AA
+        for mark in ("minus", "plus", "rod"):
+            assert contrast(colours[mark], colours["card"]) >= 3
+
+
+def contrast(one: str, other: str) -> float:
+    """Returns the contrast ratio of two colours, #rrggbb (WCAG 2.2)."""
+    darker, lighter = sorted(
+        float(
+            np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+            @ [0.2126, 0.7152, 0.0722]
+        )
+        for c in (np.frombuffer(bytes.fromhex(x[1:]), np.uint8) / 255 for x in (one, other))
+    )
+    return (lighter + 0.05) / (darker + 0.05)

@@ -1,0 +1,184 @@
+"""Drags, flicks and presses on the page, with a mouse, a finger and keys."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import SCREENS, Player
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+from selenium.webdriver.common.actions.pointer_input import PointerInput
+from selenium.webdriver.common.keys import Keys
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_dragging_turns_the_pendulum_and_starts_an_episode_there(
+    width: int, height: int, pages: dict[str, str], player: Player
+) -> None:
+    player.set_screen(width, height)
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(3, 0); pendulum.step()")
+    player.run("document.getElementById('pendulum').scrollIntoView({block: 'center'})")
+    canvas = player.find("pendulum")
+    drag = ActionChains(player.driver, duration=0)
+    drag.move_to_element_with_offset(canvas, 0, -60).click_and_hold().perform()
+    assert player.state()["theta"] == pytest.approx(0, abs=0.05)
+    assert player.run("return pendulum.page.held")
+    drag = ActionChains(player.driver, duration=0)
+    drag.move_to_element_with_offset(canvas, -60, 0).pause(0.3).release().perform()
+    state = player.state()
+    assert state["theta"] == pytest.approx(np.pi / 2, abs=0.05)  # on the left is positive
+    assert (state["thetadot"], state["steps"], state["return"]) == (0, 0, 0)
+    player.wait(lambda: player.text("optimum").startswith("−"))
+    player.press("s")
+    assert player.state()["steps"] == 1
+
+
+def test_a_flick_pushes_the_pendulum(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    canvas = player.find("pendulum")
+    flick = ActionChains(player.driver, duration=30)
+    flick.move_to_element_with_offset(canvas, 0, -60).click_and_hold()
+    flick.move_to_element_with_offset(canvas, -20, -57).release().perform()
+    assert 0 < player.state()["thetadot"] <= 8
+    speed = (
+        "const t = new Touch(() => {}); t.moves = arguments[0]; return t.flickSpeed(arguments[1])"
+    )
+    assert player.run(speed, [[1, 0], [1.05, 0.1]], 1.06) == pytest.approx(2)
+    assert player.run(speed, [[1, 0], [1.05, -1]], 1.06) == -8  # the speed limit
+    assert player.run(speed, [[1, 0], [1.05, 0.1]], 2) == 0  # held still before the release
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+@pytest.mark.parametrize("finger", ["mouse", "touch"])
+def test_a_press_on_the_portrait_chooses_the_state(
+    finger: str, width: int, height: int, duel: str, player: Player
+) -> None:
+    player.set_screen(width, height)
+    player.open(duel)
+    player.press(Keys.SPACE)
+    place = player.run(
+        "const c = document.getElementById('portrait'); c.scrollIntoView({block: 'center'});"
+        "const r = c.getBoundingClientRect();"
+        "const [left, right, top, bottom] = portraitEdges(r.width, r.height);"
+        "return [r.left + left + 0.75 * (right - left), r.top + top + 0.25 * (bottom - top)]"
+    )
+    pointer = PointerInput(finger, finger)  # type: ignore[no-untyped-call]
+    press = ActionBuilder(player.driver, mouse=pointer, duration=0)
+    action: Any = press.pointer_action
+    action.move_to_location(*map(round, place)).pointer_down().pointer_up()
+    press.perform()
+    found = player.run("return pendulum.page.episodes.map(e => [e.theta, e.thetadot])")
+    np.testing.assert_allclose(found[0], [np.pi / 2, 4], atol=0.1)
+    assert found[0] == found[1]
+    player.press("h")
+    assert player.run("return pendulum.page.episodes.map(e => e.theta)") == [np.pi, np.pi]
+
+
+def middle_of(player: Player, id: str) -> tuple[float, float]:
+    """Scrolls an element into view and returns its middle on the screen."""
+    place = player.run(
+        "const e = document.getElementById(arguments[0]); e.scrollIntoView({block: 'center'});"
+        "const r = e.getBoundingClientRect();"
+        "return [r.left + r.width / 2, r.top + r.height / 2]",
+        id,
+    )
+    return place[0], place[1]
+
+
+@pytest.fixture
+def fingers(player: Player) -> Iterator[Player]:
+    """A user with a touch screen."""
+    player.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
+    yield player
+    player.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_a_finger_turns_and_flicks_the_pendulum(
+    width: int, height: int, pages: dict[str, str], fingers: Player
+) -> None:
+    player = fingers
+    player.set_screen(width, height)
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    x, y = middle_of(player, "pendulum")
+    scrolled = player.run("return scrollY")
+    now = time.time()
+    player.finger("touchStart", (x, y - 50), now)
+    player.finger("touchMove", (x - 50, y), now + 1)
+    player.wait(lambda: player.run("return pendulum.page.held"))
+    player.finger("touchMove", (x, y + 50), now + 2)
+    player.finger("touchEnd", (x, y + 50), now + 3)
+    player.wait(lambda: not player.run("return pendulum.page.held"))
+    state = player.state()
+    assert abs(state["theta"]) == pytest.approx(np.pi, abs=0.05)
+    assert (state["thetadot"], state["steps"]) == (0, 0)  # held still before the release
+    assert player.run("return scrollY") == scrolled  # the finger did not move the page
+    now += 10
+    player.finger("touchStart", (x, y - 50), now)
+    for i in range(1, 6):
+        player.finger("touchMove", (x - 4 * i, y - 50), now + 0.016 * i)
+    player.finger("touchEnd", (x - 20, y - 50), now + 0.09)
+    player.wait(lambda: not player.run("return pendulum.page.held"))
+    assert player.state()["theta"] == pytest.approx(np.arctan2(20, 50), abs=0.05)
+    assert 2 < player.state()["thetadot"] <= 8
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_a_finger_chooses_a_state_on_the_portrait(
+    width: int, height: int, pages: dict[str, str], fingers: Player
+) -> None:
+    player = fingers
+    player.set_screen(width, height)
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    x, y = middle_of(player, "portrait")
+    left, right, top, bottom = player.run(
+        "const c = document.getElementById('portrait');"
+        "return portraitEdges(c.clientWidth, c.clientHeight)"
+    )
+    now = time.time()
+    player.finger("touchStart", (x, y), now)
+    player.finger("touchMove", (x + 40, y - 20), now + 0.1)
+    player.finger("touchEnd", (x + 40, y - 20), now + 0.2)
+    player.wait(lambda: not player.run("return pendulum.page.held"))
+    state = player.state()
+    theta = (18 + 40) / (right - left) * 2 * np.pi  # the axes are not in the middle of the canvas
+    theta -= 36 / (right - left) * 2 * np.pi
+    assert state["theta"] == pytest.approx(theta, abs=0.1)
+    speed = (20 + 16) / (bottom - top) * 16 - 32 / (bottom - top) * 16
+    assert state["thetadot"] == pytest.approx(speed, abs=0.3)
+
+
+def test_arrows_on_the_focused_portrait_choose_any_state(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages["small"])
+    player.press(Keys.SPACE)
+    player.run("pendulum.reset(0.52, 0); document.getElementById('portrait').focus()")
+    player.press(Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_UP)
+    state = player.state()
+    assert [state["theta"], state["thetadot"]] == pytest.approx([0.6, 1.0])
+    assert player.text("status") == "Held at 0.60 rad, 1.00 rad/s. Enter lets go."
+    assert not state["youDrive"]
+    fine = ActionChains(player.driver, duration=0)
+    fine.key_down(Keys.SHIFT).send_keys(Keys.ARROW_LEFT, Keys.ARROW_DOWN).key_up(Keys.SHIFT)
+    fine.perform()
+    player.press(Keys.ENTER)
+    assert not player.run("return pendulum.page.held")
+    state = player.state()
+    assert [state["theta"], state["thetadot"], state["steps"]] == pytest.approx([0.59, 0.9, 0])
+    player.press(*[Keys.ARROW_LEFT] * 40, *[Keys.ARROW_DOWN] * 20)
+    state = player.state()
+    assert state["theta"] == pytest.approx(0.6 - 40 * 0.1 + 2 * np.pi, abs=0.11)  # once around
+    assert state["thetadot"] == -8
+    player.press(Keys.TAB)  # leaving the portrait lets go too
+    assert not player.run("return pendulum.page.held")
+    assert player.text("status") == "Paused. The network drives."

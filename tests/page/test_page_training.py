@@ -1,0 +1,203 @@
+"""The slider through the training, on the page of a run with snapshots."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import SCREENS, Player, pixels_of
+from conftest import Refusal
+from selenium.webdriver.common.keys import Keys
+
+import keras_pendulum as kp
+from keras_pendulum.dqn.network import Provenance
+from keras_pendulum.page import __main__ as page_command
+from keras_pendulum.page import build
+from keras_pendulum.page.training import training_content
+from keras_pendulum.storage.snapshots import read_snapshots
+from keras_pendulum.train.checkpoint import load_history
+
+CONFIG = kp.preset(
+    "reference", episodes=8, snapshots=5, hidden_units=(16, 8), warmup_episodes=1, gravity=2.5
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run with the networks after 0, 2, 4, 6 and 8 episodes."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("keras_pendulum.train.train_dqn.run_phase_planes", lambda *run: {})
+        patched.setattr("keras_pendulum.train.run_figure.draw_run", lambda *run: b"a picture")
+        folder = tmp_path_factory.mktemp("runs") / "my run"
+        kp.train_dqn(CONFIG, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The address of the run's page."""
+    out = tmp_path_factory.mktemp("page") / "page.html"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(build, "THETA_CELLS", 50)  # the optimum is tested elsewhere
+        assert page_command.main([str(run), "--out", str(out)]) == 0
+    return out.as_uri()
+
+
+def shown_episode(player: Player) -> str:
+    return str(player.find("snapshot").get_attribute("aria-valuetext"))
+
+
+def test_slider_shows_each_network_of_the_run(run: Path, page: str, player: Player) -> None:
+    player.open(page)
+    player.press(Keys.SPACE)
+    assert player.text("about").startswith("my run (preset reference), a 16-8 tanh network")
+    assert shown_episode(player) == "episode 8 of 8"
+    player.run("pendulum.reset(2, 0.5)")
+    player.find("snapshot").send_keys(Keys.HOME)
+    assert shown_episode(player) == "episode 0 of 8"
+    final = kp.load_weights(run / "pendulum_weight.h5")
+    _, history = load_history(run / "pendulum_weight.h5")
+    observation = [np.cos(2.0), np.sin(2.0), 0.5]
+    values = []
+    for each in read_snapshots(run / "pendulum_weight_snapshots.h5", final, history):
+        assert shown_episode(player) == f"episode {each.episodes} of 8"
+        network, start = final.clone(), 0
+        shapes = [array.shape for array in network.get_weights()]
+        arrays = []
+        for shape in shapes:
+            size = int(np.prod(shape))
+            arrays.append(each.weights[start : start + size].astype(np.float32).reshape(shape))
+            start += size
+        network.set_weights(arrays)
+        expected = network(np.array([observation], np.float32)).numpy()[0]
+        state = player.state()
+        np.testing.assert_allclose(state["qValues"], expected, atol=3e-3 * np.ptp(expected) + 3e-3)
+        assert (state["theta"], state["thetadot"], state["steps"]) == (2, 0.5, 0)
+        values.append(state["qValues"])
+        player.press("s", "s")  # the next network starts where this one did
+        player.find("snapshot").send_keys(Keys.ARROW_RIGHT)
+    exact = final(np.array([observation], np.float32)).numpy()[0]
+    np.testing.assert_allclose(values[-1], exact, atol=1e-5)
+    assert all(one != two for one, two in pairwise(values))
+
+
+def test_map_and_cursor_move_with_the_slider(run: Path, page: str, player: Player) -> None:
+    player.open(page)
+    player.press(Keys.SPACE)
+    maps = []
+    for index in (4, 1, 4):
+        player.run("pendulum.page.training.show(arguments[0])", index)
+        player.wait(lambda: player.run("return pendulum.page.map.ready"))
+        maps.append(player.run("return Array.from(pendulum.page.map.torques)"))
+        if index == 1:
+            ink = pixels_of(player, "curve", "ink")
+            column = ink.sum(axis=0).argmax()
+            assert (column - 8) / (ink.shape[1] - 16) == pytest.approx(2 / 8, abs=0.01)
+    assert maps[0] == maps[2] != maps[1]
+
+
+def test_a_key_plays_the_training_from_its_start(page: str, player: Player) -> None:
+    player.open(page)
+    player.press(Keys.SPACE)
+    player.press("p")
+    assert player.text("play-training").startswith("Stop")
+    assert player.text("status") == "The network drives."  # time runs
+    assert player.run("return pendulum.page.training.shown") == 0
+    for index in (1, 2):
+        player.run("pendulum.page.training.seconds = 3")
+        player.run("window.expected = arguments[0]", index)
+        player.wait(lambda: player.run("return pendulum.page.training.shown === expected"))
+    player.press(Keys.SPACE)  # the pause stops it
+    assert player.text("play-training").startswith("Play training")
+    player.find("play-training").click()
+    assert player.run("return pendulum.page.training.shown") == 2
+    for _ in range(3):
+        player.run("pendulum.page.training.seconds = 3")
+        player.wait(lambda: player.run("return pendulum.page.training.seconds") < 3)
+    player.wait(lambda: not player.run("return pendulum.page.training.playing"))
+    assert shown_episode(player) == "episode 8 of 8"
+
+
+def test_training_plays_without_motion_for_reduced_motion(page: str, player: Player) -> None:
+    player.set_screen(1280, 800, **{"reduced-motion": "reduce"})
+    player.open(page)
+    player.press("p")
+    player.run("pendulum.page.training.seconds = 3")
+    player.wait(lambda: shown_episode(player) == "episode 2 of 8")
+    assert player.text("status") == "Paused. The network drives."
+    assert player.state()["steps"] == 0
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_slider_is_visible_with_the_pendulum(
+    width: int, height: int, page: str, player: Player
+) -> None:
+    player.set_screen(width, height)
+    player.open(page)
+    ids = ["pair", "training", "snapshot", "curve", "play-training"]
+    ids += ["phase"] if width != 844 else []
+    boxes = player.run(
+        "return arguments[0].map(id => document.getElementById(id).getBoundingClientRect())"
+        ".map(r => [r.top, r.bottom, r.left, r.right])",
+        ids,
+    )
+    for top, bottom, left, right in boxes:
+        assert 0 <= top < bottom <= height and 0 <= left < right <= width
+    training, pair = boxes[1], boxes[0]
+    assert pair[1] <= training[0]  # the slider covers nothing of the pendulum
+
+
+def test_page_without_snapshots_has_no_slider(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    assert not player.find("training").is_displayed()
+    player.press("p")
+    assert player.text("problem") == ""
+
+
+def test_learning_curve_is_the_mean_of_ten_episodes(run: Path) -> None:
+    checkpoint = run / "pendulum_weight.h5"
+    content = training_content(checkpoint, kp.load_weights(checkpoint))
+    assert content is not None
+    _, history = load_history(checkpoint)
+    rewards = [record.average_reward for record in history]
+    means = [np.mean(rewards[: count + 1]) for count in range(8)]  # fewer than 10 so far
+    np.testing.assert_allclose(content["curve"], means, rtol=1e-3)
+
+
+def test_run_without_snapshots_has_a_page_and_a_hint(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "THETA_CELLS", 50)
+    kp.save_weights(
+        kp.DQN((8,), provenance=Provenance(gravity=7.0)), tmp_path / "pendulum_weight.h5"
+    )
+    out = tmp_path / "page.html"
+    assert page_command.main([str(tmp_path), "--out", str(out)]) == 0
+    assert "There is no slider: the run has no snapshots" in capsys.readouterr().out
+    assert '"training": null' in out.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"damaged", "pendulum_weight_snapshots.h5: not an HDF5 file"),
+        (None, "pendulum_weight_snapshots.h5: holds no snapshots of a run"),
+    ],
+)
+def test_wrong_snapshots_are_refused_in_one_line(
+    content: bytes | None,
+    message: str,
+    run: Path,
+    refusal: Refusal,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    folder = tmp_path_factory.mktemp("copy")
+    (folder / "pendulum_weight.h5").write_bytes((run / "pendulum_weight.h5").read_bytes())
+    snapshots = folder / "pendulum_weight_snapshots.h5"
+    if content is None:
+        kp.save_weights(kp.DQN((16, 8)), snapshots)
+    else:
+        snapshots.write_bytes(content)
+    assert message in refusal(page_command.main, [folder])
