@@ -19,6 +19,7 @@ from keras_pendulum.version import __version__
 if TYPE_CHECKING:
     from keras_pendulum.config.config import Config
     from keras_pendulum.config.presets import preset
+    from keras_pendulum.diagnose.diagnosis import Diagnosis, diagnose
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
     from keras_pendulum.evaluate.evaluation import evaluate_policy
@@ -34,12 +35,14 @@ __all__ = [
     "DQN",
     "Config",
     "ConfigError",
+    "Diagnosis",
     "Policy",
     "Score",
     "TrainingResult",
     "UserError",
     "WeightsError",
     "__version__",
+    "diagnose",
     "evaluate_policy",
     "find_weights",
     "load_policy",
@@ -54,6 +57,7 @@ __all__ = [
 _MODULES = {
     "config.config": ("Config",),
     "config.presets": ("preset",),
+    "diagnose.diagnosis": ("Diagnosis", "diagnose"),
     "dqn.network": ("DQN",),
     "errors": ("ConfigError", "UserError", "WeightsError"),
     "evaluate.evaluation": ("evaluate_policy",),

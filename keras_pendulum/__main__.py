@@ -26,6 +26,7 @@ from keras_pendulum.version import __version__
 COMMANDS = {
     "train": "train a DQN, and evaluate it",
     "evaluate": "evaluate a policy, and compare it with the best possible return",
+    "diagnose": "name what is wrong with an agent",
     "play": "drive the pendulum by hand, then watch a policy from the same start",
     "page": "write a page for the browser that shows a policy",
     "compare": "draw the learning curves and regrets of several runs",

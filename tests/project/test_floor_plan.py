@@ -14,7 +14,7 @@ PACKAGE = Path(keras_pendulum.__file__).parent
 # From the top down. `__main__` starts the commands. The modules at the end have no room and may be
 # imported from everywhere.
 ROOMS = (
-    *("study", "compare", "train", "play", "page", "evaluate", "optimum"),
+    *("study", "compare", "diagnose", "train", "play", "page", "evaluate", "optimum"),
     *("storage", "dqn", "config", "environments"),
 )
 WITHOUT_ROOM = (

@@ -1,0 +1,72 @@
+"""The report of a diagnosis: one HTML file without links to other files."""
+
+from __future__ import annotations
+
+import base64
+import io
+from html import escape
+from typing import TYPE_CHECKING
+
+from keras_pendulum.errors import one_line
+
+if TYPE_CHECKING:
+    from keras_pendulum.diagnose.diagnosis import Diagnosis
+    from keras_pendulum.diagnose.evidence import Finding
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 46rem; padding: 1rem;
+  overflow-wrap: break-word; color: #1a1a1a; background: #ffffff; }
+h1 { font-size: 1.4rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
+img { max-width: 100%; height: auto; }
+dt { font-weight: 600; } dd { margin: 0 0 0.5rem 0; }
+"""
+
+
+def as_html(diagnosis: Diagnosis) -> str:
+    """Returns the report. Every text from outside, such as the agent's name, is escaped."""
+    subject = diagnosis.measurement.subject
+    name = _text(subject.name)
+    parts = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>Diagnosis of {name}</title><style>{_STYLE}</style></head><body>",
+        f"<h1>Diagnosis of {name}</h1>",
+        f"<p><strong>{_text(diagnosis.verdict)}</strong></p>",
+        f"<p>Pendulum-v1, g = {subject.gravity:g}, γ = {subject.discount:g}. The best possible "
+        f"mean return is {diagnosis.measurement.optimum:.2f}.</p>",
+        f'<img alt="Learned and exact values, repairs" src="{_image(diagnosis)}">',
+    ]
+    for number, finding in enumerate(diagnosis.findings, 1):
+        parts += [f"<h2>{number}. {_text(finding.name)}</h2>", _section(finding)]
+    for note in diagnosis.notes:
+        parts += [f"<h2>Note, costs little: {_text(note.name)}</h2>", _section(note)]
+    parts += [f"<p>Not told: {_text(limit)}.</p>" for limit in diagnosis.limits]
+    return "\n".join([*parts, "</body></html>", ""])
+
+
+def _section(finding: Finding) -> str:
+    rows = {
+        "Evidence": finding.evidence,
+        "A healthy network": finding.healthy,
+        "What it is": finding.explanation,
+        "What to do": finding.remedy,
+    }
+    if finding.repair is not None:
+        repair = finding.repair
+        rows["Repair without training"] = f"{repair.name}: regret {repair.regret:.2f}"
+    if finding.cost is not None:
+        rows["Cost in return"] = f"{finding.cost:.1f}"
+    rows["Read more"] = finding.page
+    items = "".join(f"<dt>{_text(name)}</dt><dd>{_text(text)}</dd>" for name, text in rows.items())
+    return f"<dl>{items}</dl>"
+
+
+def _text(text: str) -> str:
+    return escape(one_line(text))
+
+
+def _image(diagnosis: Diagnosis) -> str:
+    stream = io.BytesIO()
+    diagnosis.figure().savefig(stream, format="png", dpi=90)
+    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"

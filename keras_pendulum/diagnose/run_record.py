@@ -1,0 +1,108 @@
+"""What a run folder adds: its history, and whether its stored transitions obey the pendulum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.diagnose.signals import line_fit
+from keras_pendulum.diagnose.states import Array
+from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.optimum.dynamics import MAX_SPEED, TIME_STEP
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """The settings, the history and the stored transitions of a run."""
+
+    config: Config
+    history: list[EpisodeRecord]
+    replay: Transitions  # [N, ...], oldest first
+
+    @property
+    def updates(self) -> int:
+        """The number of updates."""
+        return self.history[-1].updates if self.history else 0
+
+    @property
+    def steps(self) -> int:
+        """The number of environment steps."""
+        return self.history[-1].environment_steps if self.history else 0
+
+    @property
+    def epsilons(self) -> Array:
+        """ε of each episode."""
+        return np.array([record.epsilon for record in self.history])
+
+    @property
+    def states(self) -> Array:
+        """The stored states [N, 2], θ in rad and θ̇ in rad/s."""
+        cosine, sine, speed = self.replay.observation.astype(np.float64).T
+        return np.stack([np.arctan2(sine, cosine), speed], axis=1)
+
+    @property
+    def lower_half(self) -> float:
+        """The share of the stored states with the pendulum below the horizontal."""
+        return float((self.replay.observation[:, 0] < 0).mean())
+
+    def seen_cells(self, cells: int = 8) -> float:
+        """Returns the share of the cells of the plane, up to 4 rad/s, with a stored state."""
+        theta, speed = self.states.T
+        theta, speed = theta[np.abs(speed) < 4], speed[np.abs(speed) < 4]
+        edges = [np.linspace(-np.pi, np.pi, cells + 1), np.linspace(-4, 4, cells + 1)]
+        counts, *_ = np.histogram2d(theta, speed, bins=edges)
+        return float((counts > 0).mean())
+
+    def action_counts(self, actions: int) -> NDArray[np.intp]:
+        """Returns how often each action is stored, [A]."""
+        return np.bincount(self.replay.action, minlength=actions)
+
+    def torque_fit(self, torques: Array, gravity: float) -> tuple[float, float]:
+        """Returns correlation and gain between the stored torque and the one that acted.
+
+        The torque that acted follows from both observations by the equation of motion. Both are 1
+        in a healthy buffer.
+        """
+        theta, speed = self.states.T
+        next_speed = self.replay.next_observation[:, 2].astype(np.float64)
+        free = np.abs(next_speed) < MAX_SPEED - 1e-3
+        acted = ((next_speed - speed) / TIME_STEP - 1.5 * gravity * np.sin(theta)) / 3
+        fit = line_fit(acted[free], torques[self.replay.action][free])
+        return fit.correlation, fit.slope
+
+    def reward_fit(self, torques: Array) -> tuple[float, float]:
+        """Returns correlation and factor between the stored rewards and the exact ones.
+
+        Both are 1 in a healthy buffer, after division by the declared scale.
+        """
+        theta, speed = self.states.T
+        exact = -(theta**2) - 0.1 * speed**2 - 0.001 * torques[self.replay.action] ** 2
+        fit = line_fit(self.replay.reward / self.config.reward_scale, exact)
+        return fit.correlation, fit.slope
+
+    def shifted_reward_fit(self, torques: Array) -> float:
+        """Returns the correlation of the stored rewards with the exact ones of the step before."""
+        theta, speed = self.states.T
+        exact = -(theta**2) - 0.1 * speed**2 - 0.001 * torques[self.replay.action] ** 2
+        same = np.all(self.replay.observation[1:] == self.replay.next_observation[:-1], axis=1)
+        return line_fit(self.replay.reward[1:][same], exact[:-1][same]).correlation
+
+    @property
+    def terminal(self) -> float:
+        """The share of the stored transitions that end their episode."""
+        return float(self.replay.terminated.mean())
+
+    @property
+    def last_loss(self) -> float:
+        """The mean loss of the last tenth of the episodes over the lowest tenth before."""
+        losses = np.array([record.loss for record in self.history])
+        losses = losses[np.isfinite(losses)]
+        if len(losses) < 20:
+            return 1.0
+        part = len(losses) // 10
+        tenths = losses[: 10 * part].reshape(10, part).mean(axis=1)
+        return float(tenths[-1] / max(tenths.min(), 1e-12))

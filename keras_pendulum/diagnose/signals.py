@@ -1,0 +1,117 @@
+"""The signals of a diagnosis: pure functions of learned and exact Q-values.
+
+`learned` and `exact` are [N, A]: one row for each state, one column for each torque. A row's mean
+is the state's value. What is left, the row minus its mean, is the advantage of each torque: it
+alone decides which torque is chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+QValues = Callable[[NDArray[np.float32]], Array]  # from observations [B, 3] to [B, A]
+
+
+class Fit(NamedTuple):
+    """The straight line through learned over exact values."""
+
+    slope: float
+    offset: float
+    correlation: float
+
+
+def line_fit(learned: Array, exact: Array) -> Fit:
+    """Returns the fit of two arrays of one shape; 0 for the correlation of a constant."""
+    x, y = exact.ravel().astype(np.float64), learned.ravel().astype(np.float64)
+    deviation_x, deviation_y = x - x.mean(), y - y.mean()
+    square_x, square_y = deviation_x @ deviation_x, deviation_y @ deviation_y
+    product = deviation_x @ deviation_y
+    slope = product / square_x if square_x > 0 else 0.0
+    scale = np.sqrt(square_x) * np.sqrt(square_y)
+    correlation = product / scale if scale > 0 else 0.0
+    return Fit(float(slope), float(y.mean() - slope * x.mean()), float(correlation))
+
+
+def advantages(q: Array) -> Array:
+    """Returns the Q-values minus the mean of their state, [N, A]."""
+    return q - q.mean(axis=1, keepdims=True)
+
+
+def value_fit(learned: Array, exact: Array) -> Fit:
+    """Returns the fit of the states' values."""
+    return line_fit(learned.mean(axis=1), exact.mean(axis=1))
+
+
+def advantage_fit(learned: Array, exact: Array) -> Fit:
+    """Returns the fit of the advantages of all states and torques."""
+    return line_fit(advantages(learned), advantages(exact))
+
+
+def torque_slopes(q: Array, torques: Array) -> Array:
+    """Returns how fast each state's Q-values grow with the torque, [N], per N·m."""
+    centred = torques - torques.mean()
+    return advantages(q) @ centred / (centred @ centred)
+
+
+def output_torques(learned: Array, exact: Array, torques: Array) -> Array:
+    """Returns the torque that each output behaves like, [A], as a multiple of one unknown scale.
+
+    The exact advantage is nearly proportional to the torque: λ(s)·u. Each output's advantage is
+    projected on λ, so a healthy network gives its own torques times the slope of its values.
+    """
+    direction = torque_slopes(exact, torques)  # [N]
+    square = direction @ direction
+    found: Array = advantages(learned).T @ direction / (square if square > 0 else 1.0)
+    return found
+
+
+def output_outliers(learned: Array, exact: Array) -> Array:
+    """Returns how far each output's mean error is from that of the other outputs, [A].
+
+    It is a robust z-score: the distance to the median, over the median distance times 1.48.
+    """
+    error = advantages(learned - exact).mean(axis=0)  # [A]
+    distance = np.abs(error - np.median(error))
+    spread = 1.48 * np.median(distance)
+    return distance / max(spread, 1e-9 * (1 + np.abs(learned).max()))
+
+
+def asymmetry(q: Array, mirrored_q: Array) -> float:
+    """Returns the root mean square of Q(s, u) - Q(-s, -u), as a share of the spread of Q.
+
+    Args:
+        q: [N, A] at some states.
+        mirrored_q: [N, A] at the mirrored states; its columns are turned round here.
+    """
+    spread = q.std()
+    return float(np.sqrt(np.mean((q - mirrored_q[:, ::-1]) ** 2)) / spread) if spread > 0 else 0.0
+
+
+def relative_error(learned: Array, exact: Array) -> Array:
+    """Returns each state's error after the best straight line, as a share of the exact spread."""
+    values, truth = learned.mean(axis=1), exact.mean(axis=1)
+    fit = line_fit(values, truth)
+    slope = fit.slope if abs(fit.slope) > 1e-9 else 1.0
+    spread = max(truth.std(), 1e-9)
+    return np.asarray(np.abs((values - fit.offset) / slope - truth) / spread)
+
+
+def saturation(hidden: list[NDArray[np.float32]], activations: list[str]) -> tuple[float, float]:
+    """Returns the shares of saturated tanh outputs and of ReLU units that are never active.
+
+    Args:
+        hidden: the outputs [N, units] of each hidden layer.
+        activations: of each layer.
+    """
+    saturated, dead = [0.0], [0.0]
+    for layer, activation in zip(hidden, activations, strict=True):
+        if activation == "tanh":
+            saturated.append(float((np.abs(layer) > 0.99).mean()))
+        elif activation == "relu":
+            dead.append(float((layer.max(axis=0) <= 0).mean()))
+    return max(saturated), max(dead)

@@ -1,0 +1,103 @@
+"""The states at which a diagnosis compares Q-values, and the episodes that it simulates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.environments.actions import MAX_TORQUE
+from keras_pendulum.environments.tasks import STEPS_PER_EPISODE
+from keras_pendulum.optimum.dynamics import MAX_SPEED, TORQUES, step_all_torques
+from keras_pendulum.optimum.value_iteration import value_at
+
+Array = NDArray[np.float64]
+# From observations [B, 3] to torques [B] in N·m.
+Act = Callable[[NDArray[np.float32]], Array]
+
+_STATES = 1500  # of each kind
+
+
+def observe(states: Array) -> NDArray[np.float32]:
+    """Returns the observations [N, 3] of states [N, 2] (θ in rad, θ̇ in rad/s)."""
+    theta, speed = states.T
+    return np.stack([np.cos(theta), np.sin(theta), speed], axis=1).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """Simulated episodes from B starts."""
+
+    states: Array  # [steps, B, 2], θ in rad and θ̇ in rad/s
+    torques: Array  # [steps, B] N·m
+    rewards: Array  # [steps, B]
+
+    @property
+    def returns(self) -> Array:
+        """The undiscounted returns [B]."""
+        return np.asarray(self.rewards.sum(axis=0))
+
+    def discounted(self, discount: float) -> Array:
+        """Returns the discounted sums of the rewards from the first step, [B]."""
+        return np.asarray(discount ** np.arange(len(self.rewards)) @ self.rewards)
+
+
+def simulate(act: Act, gravity: float, starts: Array, steps: int = STEPS_PER_EPISODE) -> Episodes:
+    """Returns the episodes of a policy; a torque that is no finite number counts as 0.
+
+    Args:
+        act: the policy.
+        gravity: m/s².
+        starts: [B, 2], θ in rad and θ̇ in rad/s.
+        steps: steps per episode.
+    """
+    states = np.empty((steps, *starts.shape))
+    torques, rewards = np.empty((2, steps, len(starts)))
+    state = starts
+    for step in range(steps):
+        torque = np.nan_to_num(np.asarray(act(observe(state)), np.float64), posinf=0, neginf=0)
+        torque = np.clip(torque, -MAX_TORQUE, MAX_TORQUE)
+        reward, theta, speed = step_all_torques(gravity, state[:, 0], state[:, 1], torque[:, None])
+        states[step], torques[step], rewards[step] = state, torque, reward[:, 0]
+        state = np.stack([theta[:, 0], speed[:, 0]], axis=1)
+    return Episodes(states, torques, rewards)
+
+
+def plane_states() -> Array:
+    """Returns states [N, 2] from the whole plane."""
+    random = np.random.RandomState(0)
+    return np.asarray(random.uniform((-np.pi, -MAX_SPEED), (np.pi, MAX_SPEED), (_STATES, 2)))
+
+
+def training_states(
+    table: NDArray[np.float32], gravity: float, discount: float, starts: Array
+) -> Array:
+    """Returns states [N, 2] that a run meets: the exact policy with many random torques.
+
+    Args:
+        table: exact V of the task.
+        gravity: m/s².
+        discount: γ.
+        starts: [B, 2].
+    """
+    random = np.random.RandomState(1)
+
+    def act(observation: NDArray[np.float32]) -> Array:
+        theta = np.arctan2(observation[:, 1], observation[:, 0]).astype(np.float64)
+        speed = observation[:, 2].astype(np.float64)
+        reward, next_theta, next_speed = step_all_torques(gravity, theta, speed)
+        greedy = (reward + discount * value_at(table, next_theta, next_speed)).argmax(axis=1)
+        explore = random.random_sample(len(theta)) < epsilon
+        indices = np.where(explore, random.randint(len(TORQUES), size=len(theta)), greedy)
+        return np.asarray(TORQUES[indices])
+
+    epsilon = np.linspace(0.1, 1, len(starts))[random.permutation(len(starts))]
+    states = simulate(act, gravity, starts).states.reshape(-1, 2)
+    return states[random.permutation(len(states))[:_STATES]]
+
+
+def mirrored(states: Array) -> Array:
+    """Returns the states turned to the other side: -θ and -θ̇."""
+    return -states

@@ -1,0 +1,166 @@
+"""Rules for networks that fit another task, other observations, other torques, or nothing.
+
+Each returns a finding, or None. `findings` says where the thresholds come from.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from keras_pendulum.diagnose import comparisons, repairs
+from keras_pendulum.diagnose.evidence import Evidence, Finding
+from keras_pendulum.diagnose.signals import line_fit
+from keras_pendulum.optimum.dynamics import MAX_SPEED
+
+_SHIPPED_GRAVITIES = (1.0, 10.0)
+_WORST_REWARD = np.pi**2 + 0.1 * MAX_SPEED**2 + 0.004
+
+
+def not_finite(e: Evidence) -> Finding | None:
+    """Finds values that are not finite or far beyond every possible one."""
+    m = e.measurement
+    if not m.finite:
+        return Finding("broken-network", "Q-values that are not finite", "all finite")
+    largest = float(np.abs(m.learned_q).max())
+    limit = _WORST_REWARD / max(1 - m.subject.discount, 0.005)
+    if largest > 1e5 * limit:
+        return Finding("broken-network", f"values up to {largest:.1e}", f"at most {limit:.0f}")
+    return None
+
+
+def constant(e: Evidence) -> Finding | None:
+    """Finds values that are the same for all states or for all actions."""
+    m = e.measurement
+    largest = float(np.abs(m.learned_q).max())
+    saturated, dead = m.units
+    spread = float(m.learned_q.std(axis=0).max())
+    if spread < 1e-6 * max(1.0, largest):
+        evidence = f"values that differ by {spread:.1g} from state to state"
+        if max(saturated, dead) > 0.99:
+            evidence += f"; {max(saturated, dead):.0%} of a layer's units saturated or dead"
+        return Finding("broken-network", evidence, f"{m.value_spread:.0f}")
+    across = float(np.ptp(m.learned_q, axis=1).max())
+    if across < 1e-6 * max(1.0, largest):
+        return Finding(
+            "broken-network", f"values that differ by {across:.1g} from action to action", "above 1"
+        )
+    return None
+
+
+def reward_sign(e: Evidence) -> Finding | None:
+    """Finds values that fall where the exact ones rise."""
+    value = e.measurement.value
+    if value.correlation < -0.6 and value.slope < -0.2:
+        evidence = f"slope of learned on exact values {value.slope:.2f}"
+        return Finding("reward-sign", evidence, "1.00")
+    return None
+
+
+def observation_map(e: Evidence) -> Finding | None:
+    """Finds a change of the observation with which the values fit."""
+    name, best = e.observation
+    if best.scaled_score > 0.6 and best.scaled_score > e.declared.scaled_score + 0.25:
+        return e.repaired(
+            "observation-map",
+            f"match with the exact values {e.declared.score:.2f}, with the observation [{name}] "
+            f"{best.score:.2f}",
+            "best as it is",
+            repairs.change_observations(e.measurement, name),
+        )
+    return None
+
+
+def torque_map(e: Evidence) -> Finding | None:
+    """Finds torques with which the outputs fit."""
+    m = e.measurement
+    if m.value.correlation < 0.9 or not 0.5 < m.value.slope < 2:
+        return None
+    assert m.subject.torques is not None
+    matched = repairs.matched_correlation(m)
+    if matched > 0.6 and matched > m.advantage.correlation + 0.2:
+        return e.repaired(
+            "torque-map",
+            f"correlation of the advantages {m.advantage.correlation:.2f}, with each output in "
+            f"its place {matched:.2f}",
+            "the same",
+            repairs.repair_torques(m),
+        )
+    gain = m.advantage.slope / max(m.value.slope, 1e-9)
+    in_order = line_fit(m.output_torques, m.subject.torques).correlation
+    if in_order > 0.95 and m.advantage.correlation > 0.45 and not 0.42 < gain < 2.2:
+        return e.repaired(
+            "torque-map",
+            f"outputs that behave like {gain:.2f} times their torques",
+            "0.7 to 1.1 times",
+            repairs.rescale_torques(m, gain),
+        )
+    return None
+
+
+def no_lookahead(e: Evidence) -> Finding | None:
+    """Compares with the rewards of one step, in which no torque matters yet."""
+    m, rewards = e.measurement, e.rewards
+    discount = m.subject.discount
+    if rewards.value < 0.99 or rewards.slope <= 0 or m.advantage_size > 0.45:
+        return None
+    if m.advantage.correlation > 0.6 or rewards.value < m.value.correlation:
+        return None
+    lookahead = 1 - 1 / rewards.slope  # of a run in which every state follows on itself
+    evidence = f"values {rewards.slope:.2f} times the reward of one step (correlation "
+    evidence += f"{rewards.value:.3f})"
+    healthy = f"{1 / (1 - min(discount, 0.999)):.0f} and 0.96 on average"
+    if abs(lookahead - discount) < 0.04 and discount > 0.6 and m.advantage.correlation < 0.3:
+        return Finding("misaligned-transitions", evidence, "not proportional")
+    if 0.8 < rewards.slope < 1.2:
+        return Finding("no-bootstrapping", evidence, healthy)
+    if 0.1 < lookahead < discount - 0.1:
+        return Finding("other-discount", f"{evidence}, as for γ = {lookahead:.1f}", healthy)
+    return None
+
+
+def other_task(e: Evidence) -> Finding | None:
+    """Finds another gravity or discount that the values fit better."""
+    m = e.measurement
+    declared = e.declared.scaled_score
+    candidates = [
+        ("other-gravity", f"g = {gravity:g}", gravity, match)
+        for gravity, match in comparisons.match_gravities(m).items()
+        if abs(gravity - m.subject.gravity) > 0.3 * m.subject.gravity
+    ] + [
+        ("other-discount", f"γ = {discount:g}", None, match)
+        for discount, match in comparisons.match_discounts(m).items()
+        if abs(discount - m.subject.discount) > 0.25 * (1 - m.subject.discount)
+    ]
+    name, label, gravity, best = max(candidates, key=lambda item: item[3].scaled_score)
+    if best.scaled_score < max(0.55, declared + 0.35 * (1 - declared)):
+        return None
+    evidence = f"match with the declared task {declared:.2f}, with {label} {best.scaled_score:.2f}"
+    if gravity not in _SHIPPED_GRAVITIES:  # the optimum of another one takes 20 s
+        return Finding(name, evidence, "best with the declared task")
+    repair = repairs.change_gravity(m, gravity)
+    return Finding(name, evidence, "best with the declared task", repair, m.regret - repair.regret)
+
+
+def reward_size(e: Evidence) -> Finding | None:
+    """Finds values beyond the lowest possible one, or lost in the noise of the weights."""
+    m = e.measurement
+    lowest = -_WORST_REWARD / max(1 - m.subject.discount, 0.005)
+    mean = float(m.learned_q.mean())
+    if mean < lowest:
+        evidence = f"a mean value of {mean:.3g}"
+        return Finding("reward-scale", evidence, f"above {lowest:.0f}, the lowest possible")
+    slope = m.value.slope
+    if 0 <= slope < 0.02 and m.advantage_size < 0.03 and m.value.correlation > 0.5:
+        evidence = f"values {slope:.1g} times the exact ones, and actions as close"
+        return Finding("reward-scale", evidence, "1")
+    return None
+
+
+def reward_scale(e: Evidence) -> Finding | None:
+    """Finds right values of another size."""
+    m = e.measurement
+    slope = m.value.slope
+    right = m.value.correlation > 0.95 and m.advantage.correlation > 0.5
+    if right and slope > 0 and not 0.4 < slope < 2.5:
+        return Finding("reward-scale", f"values {slope:.3g} times the exact ones", "0.9 to 1.1")
+    return None

@@ -1,0 +1,182 @@
+"""Rules for faults of the training, from the network and from the run's record.
+
+Each returns a finding, or None. `findings` says where the thresholds come from.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from keras_pendulum.diagnose import repairs
+from keras_pendulum.diagnose.evidence import Evidence, Finding
+
+
+def stored_transitions(e: Evidence) -> Finding | None:
+    """Checks the stored transitions against the pendulum: a mismatch is a proof."""
+    r, m = e.record, e.measurement
+    torques = m.subject.torques
+    if r is None or torques is None or len(r.replay.action) < 200:
+        return None
+    reward_correlation, reward_slope = r.reward_fit(torques)
+    if reward_correlation < -0.9:
+        return Finding("reward-sign", "stored rewards are the negative of the exact ones", "equal")
+    if r.terminal > 0.2:
+        evidence = f"{r.terminal:.0%} of the stored transitions end their episode"
+        return Finding("no-bootstrapping", evidence, "none: the pendulum never terminates")
+    torque_correlation, _ = r.torque_fit(torques, m.subject.gravity)
+    if torque_correlation < 0.9:
+        return Finding(
+            "misaligned-transitions",
+            f"correlation of the stored action with the torque that acted {torque_correlation:.2f}",
+            "1.00",
+        )
+    if reward_correlation > 0.999 and not 0.5 < reward_slope < 2:
+        evidence = f"stored rewards {reward_slope:.3g} times the declared ones"
+        return Finding("reward-scale", evidence, "1")
+    if 0.6 < reward_correlation < 0.9999 and 0.8 < reward_slope < 1.2:
+        residual = float(np.sqrt(1 - reward_correlation**2))
+        if residual > 0.02 and r.shifted_reward_fit(torques) > 0.9999:
+            evidence = "stored rewards are those of the step before"
+            return Finding("misaligned-transitions", evidence, "those of their own step")
+    return None
+
+
+def untrained_outputs(e: Evidence) -> Finding | None:
+    """Finds outputs that are seldom stored, or far from all others."""
+    m = e.measurement
+    if e.record is not None and m.subject.torques is not None:
+        counts = e.record.action_counts(len(m.subject.torques))
+        missing = np.flatnonzero(counts < 0.05 * np.median(counts)).tolist()
+        if missing and len(missing) < len(counts) / 2 and np.median(counts) > 20:
+            return e.repaired(
+                "untrained-outputs",
+                f"no or few stored transitions of the outputs {', '.join(map(str, missing))}",
+                "about the same number of each",
+                repairs.mask_outputs(m, missing),
+            )
+    odd = np.flatnonzero(m.outliers > max(10.0, 0.3 * m.outliers.max())).tolist()
+    chosen = np.isin(m.learned_q.argmax(axis=1), odd).mean() if odd else 0.0
+    if odd and len(odd) <= len(m.outliers) / 4 and m.outliers.max() > 14 and chosen > 0.3:
+        return e.repaired(
+            "untrained-outputs",
+            f"mean error of the outputs {', '.join(map(str, odd))} {m.outliers.max():.0f} times "
+            f"the usual distance from the others; chosen in {chosen:.0%} of the states",
+            "up to 7 times",
+            repairs.mask_outputs(m, odd),
+        )
+    return None
+
+
+def too_few_updates(e: Evidence) -> Finding | None:
+    """Finds values that have hardly left their initial size."""
+    m, r = e.measurement, e.record
+    if not -0.2 < m.value.slope < 0.35 or m.advantage.correlation > 0.3:
+        return None
+    evidence = f"slope of learned on exact values {m.value.slope:.2f}"
+    if r is not None:
+        if r.updates > 4000:
+            return None
+        evidence += f", after {r.updates} updates"
+    return Finding("too-few-updates", evidence, "1.00, after some 10 000 updates")
+
+
+def exploration(e: Evidence) -> Finding | None:
+    """Finds an ε that does not fall, or starts low."""
+    r = e.record
+    if r is None or len(r.history) < 20:
+        return None
+    epsilons = r.epsilons
+    last, first = epsilons[-len(epsilons) // 5 :].mean(), epsilons[: len(epsilons) // 5].mean()
+    if last > 0.5:
+        return Finding("exploration", f"ε of the last fifth {last:.2f}", "below 0.1")
+    if first < 0.1:
+        return Finding("exploration", f"ε of the first fifth {first:.2f}", "above 0.3")
+    return None
+
+
+def narrow_starts(e: Evidence) -> Finding | None:
+    """Finds a part of the plane that was never visited."""
+    m, r = e.measurement, e.record
+    regions = m.regions
+    if r is not None:
+        seen = r.seen_cells()
+        if r.steps < 3 * len(r.replay.action) and seen < 0.75:
+            evidence = f"stored states in {seen:.0%} of the plane's cells up to 4 rad/s"
+            return Finding("narrow-starts", evidence, "above 90 %")
+        return None
+    lower, upright = regions["lower half"], regions["near upright"]
+    worse = lower > 0.5 and lower > 3 * upright
+    if m.value.slope > 0.3 and m.plane_value.correlation < 0.75 and (worse or m.asymmetry > 0.5):
+        evidence = f"error of the values in the lower half {lower:.2f}, near upright {upright:.2f}"
+        evidence += f"; asymmetry {m.asymmetry:.2f}"
+        return Finding("narrow-starts", evidence, "below 0.1 in both; asymmetry below 0.2")
+    return None
+
+
+def forgetting(e: Evidence) -> Finding | None:
+    """Finds a replay buffer that holds a small part of the run."""
+    r = e.record
+    if r is None:
+        return None
+    stored = len(r.replay.action)
+    if r.steps >= 3 * stored and stored < 6000:
+        evidence = f"the buffer holds {stored} of {r.steps} transitions, "
+        evidence += f"{r.lower_half:.0%} of them in the lower half"
+        return Finding("forgetting", evidence, "20 000 or more")
+    return None
+
+
+def learning_rate(e: Evidence) -> Finding | None:
+    """Finds a large learning rate, or the saturated layers that it leaves."""
+    m, r = e.measurement, e.record
+    saturated, dead = m.units
+    if r is not None:
+        rate, schedule = r.config.learning_rate, r.config.learning_rate_schedule
+        if rate >= 5e-3 or (schedule == "constant" and rate >= 2e-3):
+            evidence = f"learning rate {rate:g}, {schedule}; {saturated:.0%} of a layer's tanh "
+            evidence += f"units saturated, {dead:.0%} of the ReLU units dead"
+            return Finding("learning-rate", evidence, "1e-3, falling to 0")
+        return None
+    if (saturated > 0.93 or dead > 0.8) and m.value.correlation > 0.8:
+        share = max(saturated, dead)
+        return Finding(
+            "learning-rate", f"{share:.0%} of a layer's units saturated or dead", "below 85 %"
+        )
+    return None
+
+
+def overestimation(e: Evidence) -> Finding | None:
+    """Finds values above the best possible ones."""
+    m = e.measurement
+    excess = m.excess
+    if m.value.correlation > 0.85 and m.value.slope > 0.5 and excess > 0.4:
+        evidence = f"the highest value is above the best possible by {excess:.2f} of the spread; "
+        evidence += f"promised {m.predicted:.1f} from the starts, collected {m.collected:.1f}"
+        return Finding("overestimation", evidence, "0.00 to 0.15")
+    return None
+
+
+def misaligned(e: Evidence) -> Finding | None:
+    """Finds right values beside advantages that know nothing of the torque."""
+    m = e.measurement
+    if e.record is not None:  # the stored transitions have shown nothing
+        return None
+    if (
+        m.advantage.correlation < 0.15
+        and m.value.correlation > 0.93
+        and m.plane_value.correlation > 0.85
+        and 0.6 < m.value.slope < 1.6
+        and np.ptp(m.output_torques) < 1.5
+    ):
+        evidence = f"correlation of the advantages {m.advantage.correlation:.2f} beside right "
+        evidence += f"values ({m.value.correlation:.2f})"
+        return Finding("misaligned-transitions", evidence, "0.8 to 1")
+    return None
+
+
+def undetermined(e: Evidence) -> Finding | None:
+    """Says that the values are wrong without a known reason."""
+    m = e.measurement
+    evidence = f"correlation of the values {m.value.correlation:.2f}, of the advantages "
+    evidence += f"{m.advantage.correlation:.2f}"
+    return Finding("undetermined", evidence, "1.00 and 0.9")

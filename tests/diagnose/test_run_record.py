@@ -1,0 +1,98 @@
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from exact_agent import coarse_value, exact_values, subject
+
+import keras_pendulum as kp
+from keras_pendulum.diagnose import comparisons, measurement
+from keras_pendulum.diagnose.diagnosis import diagnose_subject
+from keras_pendulum.diagnose.run_folder import read_record
+from keras_pendulum.diagnose.run_record import RunRecord
+from keras_pendulum.errors import WeightsError
+from keras_pendulum.optimum.dynamics import TORQUES
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    folder = tmp_path_factory.mktemp("run")
+    kp.train_dqn(kp.preset("reference", episodes=30, hidden_units=(8, 8)), folder)
+    return read_record(folder / "pendulum_weight.h5")
+
+
+@pytest.fixture(autouse=True)
+def _coarse_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measurement, "discounted_value", coarse_value)
+    monkeypatch.setattr(comparisons, "other_value", coarse_value)
+
+
+def changed(record: RunRecord, **fields: Any) -> RunRecord:
+    return replace(record, replay=record.replay._replace(**fields))
+
+
+def first(record: RunRecord) -> str:
+    """Returns the first finding on a useless agent with this record."""
+    agent = subject(lambda o: exact_values(o) * np.sin(20 * o[:, :1]))
+    return diagnose_subject(agent, record).findings[0].name
+
+
+def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> None:
+    assert record.torque_fit(TORQUES, 1.0) == pytest.approx((1, 1), abs=0.01)
+    assert record.reward_fit(TORQUES) == pytest.approx((1, 1), abs=1e-4)
+    assert record.shifted_reward_fit(TORQUES) < 0.9999
+    assert record.terminal == 0
+    assert record.steps == len(record.replay.action) == 6000
+    assert record.epsilons[0] == pytest.approx(0.891)
+
+
+def test_negated_rewards_are_named(record: RunRecord) -> None:
+    assert first(changed(record, reward=-record.replay.reward)) == "reward-sign"
+
+
+def test_scaled_rewards_are_named(record: RunRecord) -> None:
+    assert first(changed(record, reward=50 * record.replay.reward)) == "reward-scale"
+
+
+def test_declared_reward_scale_is_no_fault(record: RunRecord) -> None:
+    scaled = changed(record, reward=50 * record.replay.reward)
+    scaled = replace(scaled, config=replace(record.config, reward_scale=50.0))
+    assert scaled.reward_fit(TORQUES)[1] == pytest.approx(1, abs=1e-4)
+
+
+def test_terminal_transitions_are_named(record: RunRecord) -> None:
+    terminated = np.ones_like(record.replay.terminated)
+    assert first(changed(record, terminated=terminated)) == "no-bootstrapping"
+
+
+@pytest.mark.parametrize("field", ["action", "next_observation", "reward"])
+def test_transitions_off_by_one_are_named(record: RunRecord, field: str) -> None:
+    before = np.roll(getattr(record.replay, field), 1, axis=0)
+    assert first(changed(record, **{field: before})) == "misaligned-transitions"
+
+
+def test_actions_that_are_never_stored_are_named(record: RunRecord) -> None:
+    kept = record.replay.action != 7
+    fields = {name: array[kept] for name, array in record.replay._asdict().items()}
+    assert first(changed(record, **fields)) == "untrained-outputs"
+
+
+def test_epsilon_that_never_falls_is_named(record: RunRecord) -> None:
+    history = [each._replace(epsilon=0.9, updates=9000) for each in record.history]
+    assert first(replace(record, history=history)) == "exploration"
+
+
+def test_small_buffer_is_named(record: RunRecord) -> None:
+    fields = {name: array[-1000:] for name, array in record.replay._asdict().items()}
+    history = [
+        each._replace(epsilon=0.9 * 0.8**index, updates=9000)
+        for index, each in enumerate(record.history)
+    ]
+    assert first(replace(changed(record, **fields), history=history)) == "forgetting"
+
+
+def test_weights_without_a_run_are_refused(tmp_path: Path) -> None:
+    kp.save_weights(kp.DQN((8,)), tmp_path / "a.h5")
+    with pytest.raises(WeightsError, match="without a run"):
+        read_record(tmp_path / "a.h5")

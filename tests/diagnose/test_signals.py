@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+
+from keras_pendulum.diagnose import signals
+
+EXACT = np.random.RandomState(0).normal(size=(200, 1)) * np.linspace(-2, 2, 41) - 5
+TORQUES = np.linspace(-2, 2, 41)
+
+
+def test_line_fit_recovers_slope_and_offset() -> None:
+    fit = signals.line_fit(3 * EXACT + 2, EXACT)
+    assert fit == pytest.approx((3, 2, 1))
+
+
+def test_line_fit_of_a_constant_has_no_correlation() -> None:
+    assert signals.line_fit(np.ones((5, 3)), EXACT[:5, :3]).correlation == 0
+    assert signals.line_fit(EXACT, np.zeros_like(EXACT)).slope == 0
+
+
+def test_advantages_leave_no_value_of_the_state() -> None:
+    assert signals.advantages(EXACT + 7).mean(axis=1) == pytest.approx(0, abs=1e-12)
+    assert signals.advantages(EXACT + 7) == pytest.approx(signals.advantages(EXACT))
+
+
+def test_output_torques_of_exact_values_are_the_torques() -> None:
+    assert signals.output_torques(EXACT, EXACT, TORQUES) == pytest.approx(TORQUES)
+
+
+def test_output_torques_follow_a_permutation_and_a_scale() -> None:
+    order = np.random.RandomState(1).permutation(41)
+    found = signals.output_torques(0.5 * EXACT[:, order], EXACT, TORQUES)
+    assert found == pytest.approx(0.5 * TORQUES[order])
+
+
+def test_output_outliers_mark_the_outputs_that_were_never_learned() -> None:
+    noise = np.random.RandomState(2).normal(size=EXACT.shape) * 0.1
+    learned = EXACT + noise
+    learned[:, [4, 9]] += 20
+    outliers = signals.output_outliers(learned, EXACT)
+    assert set(np.flatnonzero(outliers > 14)) == {4, 9}
+    assert signals.output_outliers(EXACT + noise, EXACT).max() < 7
+
+
+def test_asymmetry_compares_the_mirrored_torque() -> None:
+    assert signals.asymmetry(EXACT, EXACT[:, ::-1]) == 0
+    assert signals.asymmetry(EXACT, EXACT) > 1
+    assert signals.asymmetry(np.ones((3, 2)), np.ones((3, 2))) == 0
+
+
+def test_relative_error_ignores_scale_and_offset() -> None:
+    states = np.linspace(-9, 0, 50)[:, None] + np.zeros((50, 3))
+    assert signals.relative_error(2 * states - 4, states) == pytest.approx(0, abs=1e-9)
+
+
+def test_saturation_counts_saturated_and_dead_units() -> None:
+    saturated = np.array([[1, -1, 0.5, 0], [1, 1, 0.5, 0]], np.float32)
+    dead = np.array([[0, 2], [0, 0]], np.float32)
+    assert signals.saturation([saturated, dead], ["tanh", "relu"]) == (0.5, 0.5)
+    assert signals.saturation([dead], ["linear"]) == (0, 0)
