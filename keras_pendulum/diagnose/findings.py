@@ -58,9 +58,9 @@ RULES: tuple[Callable[[Evidence], Finding | None], ...] = (
     reward_scale,
     too_few_updates,
     exploration,
+    overestimation,
     forgetting,
     narrow_starts,
-    overestimation,
     learning_rate,
     misaligned,
 )

@@ -61,6 +61,16 @@ class RunRecord:
         """Returns how often each action is stored, [A]."""
         return np.bincount(self.replay.action, minlength=actions)
 
+    @property
+    def random_count(self) -> float:
+        """The expected number of random actions among the stored transitions."""
+        stored, expected = len(self.replay.action), 0.0
+        before = [0, *(record.environment_steps for record in self.history)]
+        for record, first in zip(self.history, before, strict=False):
+            steps = record.environment_steps - max(first, self.steps - stored)
+            expected += record.epsilon * max(0, steps)
+        return expected
+
     def torque_fit(self, torques: Array, gravity: float) -> tuple[float, float]:
         """Returns correlation and gain between the stored torque and the one that acted.
 

@@ -46,11 +46,11 @@ def untrained_outputs(e: Evidence) -> Finding | None:
     m = e.measurement
     if e.record is not None and m.subject.torques is not None:
         counts = e.record.action_counts(len(m.subject.torques))
-        missing = np.flatnonzero(counts < 0.05 * np.median(counts)).tolist()
-        if missing and len(missing) < len(counts) / 2 and np.median(counts) > 20:
+        missing = np.flatnonzero(counts == 0).tolist()
+        if missing and len(missing) < len(counts) / 2 and e.record.random_count / len(counts) > 12:
             return e.repaired(
                 "untrained-outputs",
-                f"no or few stored transitions of the outputs {', '.join(map(str, missing))}",
+                f"no stored transition of the outputs {', '.join(map(str, missing))}",
                 "about the same number of each",
                 repairs.mask_outputs(m, missing),
             )
@@ -149,7 +149,10 @@ def overestimation(e: Evidence) -> Finding | None:
     """Finds values above the best possible ones."""
     m = e.measurement
     excess = m.excess
-    if m.value.correlation > 0.85 and m.value.slope > 0.5 and excess > 0.4:
+    if excess > 3:  # also where nothing else about the values is right
+        evidence = f"the highest value is above the best possible by {excess:.1f} spreads"
+        return Finding("overestimation", evidence, "0.00 to 0.15")
+    if m.value.correlation > 0.95 and m.value.slope > 0.5 and excess > 0.45:
         evidence = f"the highest value is above the best possible by {excess:.2f} of the spread; "
         evidence += f"promised {m.predicted:.1f} from the starts, collected {m.collected:.1f}"
         return Finding("overestimation", evidence, "0.00 to 0.15")
