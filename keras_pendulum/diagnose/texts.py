@@ -82,7 +82,7 @@ TEXTS: dict[str, Text] = {
     "forgetting": Text(
         "The replay buffer holds the last episodes only. What the network learned about the way "
         "up is overwritten when no stored transition shows it.",
-        "Make the replay buffer larger: it should hold at least 20 000 transitions.",
+        "Make the replay buffer larger: it should hold at least 14 000 transitions.",
     ),
     "exploration": Text(
         "The share of random actions does not fall, or has fallen before the values were known. So "

@@ -122,7 +122,7 @@ def forgetting(e: Evidence) -> Finding | None:
     if r.steps >= 3 * stored and stored < 6000:
         evidence = f"the buffer holds {stored} of {r.steps} transitions, "
         evidence += f"{r.lower_half:.0%} of them in the lower half"
-        return Finding("forgetting", evidence, "20 000 or more")
+        return Finding("forgetting", evidence, "14 000 or more, as `reference` has")
     return None
 
 
