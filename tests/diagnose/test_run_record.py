@@ -43,7 +43,7 @@ def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> Non
     assert record.reward_fit(TORQUES) == pytest.approx((1, 1), abs=1e-4)
     assert record.shifted_reward_fit(TORQUES) < 0.9999
     assert record.terminal == 0
-    assert record.steps == len(record.replay.action) == 6000
+    assert record.steps == len(record.replay.action) == 30 * record.config.max_episode_steps
     assert record.epsilons[0] == pytest.approx(0.891)
 
 
