@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from keras_pendulum.cli import OneLineParser, run_command
-from keras_pendulum.errors import UserError
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -32,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _write_files(arguments: argparse.Namespace) -> int:
-    from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, pendulum_starts
+    from keras_pendulum.environments.tasks import pendulum_starts
     from keras_pendulum.optimum.discounted import simulate_discounted, validate_discount
     from keras_pendulum.optimum.optimal_return import (
         SHIPPED_SEEDS,
@@ -44,15 +43,13 @@ def _write_files(arguments: argparse.Namespace) -> int:
     from keras_pendulum.optimum.return_cache import file_name, write
 
     steps, discount = validate_steps(arguments.steps), validate_discount(arguments.discount)
-    if discount != 1 and steps != STEPS_PER_EPISODE:
-        raise UserError(f"--steps is {steps}; with a --discount below 1, expected 200")
     seeds = SHIPPED_SEEDS if discount == 1 else USUAL_SEEDS
     starts = pendulum_starts(seeds)
     for gravity in map(validate_gravity, arguments.gravity):
         if discount == 1:
             returns = best_return(gravity, starts, steps).tolist()
         else:
-            returns = simulate_discounted(gravity, discount, starts).tolist()
+            returns = simulate_discounted(gravity, discount, starts, steps).tolist()
         path = arguments.out / file_name(gravity, steps, discount)
         by_seed = dict(zip(seeds, returns, strict=True))
         write(path, gravity, steps, discount, returns=by_seed)

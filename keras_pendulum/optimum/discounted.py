@@ -11,10 +11,13 @@ its V is that of an episode's 200 steps. The number of sweeps is at most 1000, w
 The returns are simulated, so they are attainable. Their accuracy depends on the cells: with twice
 as many, the mean over the seeds 0 to 999 moves by 0.0001 (g = 1, γ = 0.9) and 0.02 (g = 10,
 γ = 0.98).
-The package contains those of these two tasks. These commands write them:
+The package contains those of `reference` and `swingup`, also for their training episodes. These
+commands write them:
 
     python -m keras_pendulum.optimum 1 --discount 0.9 --out keras_pendulum/optimum/data
+    python -m keras_pendulum.optimum 1 --discount 0.9 --steps 100 --out keras_pendulum/optimum/data
     python -m keras_pendulum.optimum 10 --discount 0.98 --out keras_pendulum/optimum/data
+    python -m keras_pendulum.optimum 10 --discount 0.98 --steps 60 --out keras_pendulum/optimum/data
 """
 
 from __future__ import annotations
@@ -45,6 +48,7 @@ from keras_pendulum.optimum.optimal_return import (
     optimal_return,
     validate_gravity,
     validate_seed,
+    validate_steps,
 )
 from keras_pendulum.optimum.return_cache import (
     LOWEST_REWARD,
@@ -122,7 +126,10 @@ def exact_q(
 
 
 def discounted_return(
-    gravity: float, discount: float, seeds: Iterable[int] = range(100)
+    gravity: float,
+    discount: float,
+    seeds: Iterable[int] = range(100),
+    steps: int = STEPS_PER_EPISODE,
 ) -> NDArray[np.float64]:
     """Returns the undiscounted returns of the policy that is optimal for a discount.
 
@@ -133,17 +140,18 @@ def discounted_return(
         gravity: g in m/s², 0 to 100.
         discount: γ, 0 to 1.
         seeds: reset seeds of the starts, each 0 to 2³² - 1.
+        steps: steps per episode, 1 to 200.
 
     Returns:
-        [number of seeds], of episodes of 200 steps.
+        [number of seeds]
 
     Raises:
-        ConfigError: (a ValueError) for a gravity, a discount or a seed out of range.
+        ConfigError: (a ValueError) for a gravity, a discount, a seed or steps out of range.
     """
     gravity, discount = validate_gravity(gravity), validate_discount(discount)
-    seeds = [validate_seed(seed) for seed in seeds]
+    seeds, steps = [validate_seed(seed) for seed in seeds], validate_steps(steps)
     if discount == 1:
-        return optimal_return(gravity, seeds)
+        return optimal_return(gravity, seeds, steps)
 
     def compute(missing: list[int]) -> NDArray[np.float64]:
         _log.warning(
@@ -151,9 +159,9 @@ def discounted_return(
             discount,
             gravity,
         )
-        return simulate_discounted(gravity, discount, pendulum_starts(missing))
+        return simulate_discounted(gravity, discount, pendulum_starts(missing), steps)
 
-    return stored_returns(seeds, compute, USUAL_SEEDS, gravity, STEPS_PER_EPISODE, discount)
+    return stored_returns(seeds, compute, USUAL_SEEDS, gravity, steps, discount)
 
 
 @cache
@@ -167,7 +175,7 @@ def discount_cost(gravity: float, discount: float, seeds: range) -> float:
 
 
 def simulate_discounted(
-    gravity: float, discount: float, starts: NDArray[np.float64]
+    gravity: float, discount: float, starts: NDArray[np.float64], steps: int
 ) -> NDArray[np.float64]:
     """Returns the undiscounted returns [N] of the policy that is greedy on V of a discount.
 
@@ -175,6 +183,7 @@ def simulate_discounted(
         gravity: g in m/s².
         discount: γ.
         starts: [N, 2], θ in rad and θ̇ in rad/s.
+        steps: steps per episode.
     """
     table = _solve(gravity, discount, RETURN_CELLS)
 
@@ -183,7 +192,7 @@ def simulate_discounted(
     ) -> NDArray[np.intp]:
         return (rewards + discount * value_at(table, next_theta, next_speed)).argmax(axis=1)
 
-    return simulate_return(choose_greedy, STEPS_PER_EPISODE, gravity, starts)
+    return simulate_return(choose_greedy, steps, gravity, starts)
 
 
 def validate_discount(discount: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, task_name
+from keras_pendulum.environments.tasks import task_name
 from keras_pendulum.evaluate.evaluation import optimal_training_return, random_return
 from keras_pendulum.evaluate.score import Score
 from keras_pendulum.optimum.discounted import discounted_return
@@ -19,8 +19,8 @@ _VISIBLE = 0.05  # of a return; smaller differences are within the accuracy of b
 def reference_returns(config: Config) -> dict[str, float]:
     """Returns the mean returns of a training episode by name; none for a pendulum beyond 200 steps.
 
-    The names are `best possible` and `random actions`. A pendulum's episode of 200 steps has one
-    more where it differs from the best possible: the return of the optimal policy for the discount.
+    The names are `best possible` and `random actions`. A pendulum has one more, the return of
+    the optimal policy for the discount, where it differs from the best possible.
     """
     optimum = optimal_training_return(config)
     if math.isnan(optimum):
@@ -30,9 +30,10 @@ def reference_returns(config: Config) -> dict[str, float]:
 
 
 def _discounted(config: Config, optimum: float) -> dict[str, float]:
-    if config.gravity is None or config.max_episode_steps != STEPS_PER_EPISODE:
+    if config.gravity is None:
         return {}
-    mean = float(discounted_return(config.gravity, config.discount, USUAL_SEEDS).mean())
+    task = (config.gravity, config.discount, USUAL_SEEDS, config.max_episode_steps)
+    mean = float(discounted_return(*task).mean())
     name = f"optimal policy for γ = {config.discount:g}"
     return {name: mean} if optimum - mean > _VISIBLE else {}
 

@@ -102,12 +102,20 @@ def test_damaged_table_is_computed_again(change: str, cache: Path, solved: list[
 
 
 @pytest.mark.parametrize(
-    ("gravity", "discount", "cost"), [(1.0, 0.9, 0.245), (10.0, 0.98, 2.65), (1.0, 1.0, 0.0)]
+    ("gravity", "discount", "steps", "cost"),
+    [
+        (1.0, 0.9, 200, 0.245),
+        (1.0, 0.9, 100, 0.245),
+        (10.0, 0.98, 200, 2.65),
+        (10.0, 0.98, 60, 2.61),
+        (1.0, 1.0, 200, 0.0),
+    ],
 )
 def test_shipped_returns_are_below_the_optimum_by_what_the_discount_costs(
-    gravity: float, discount: float, cost: float, solved: list[int]
+    gravity: float, discount: float, steps: int, cost: float, solved: list[int]
 ) -> None:
-    returns, optimum = discounted_return(gravity, discount), optimal_return(gravity)
+    returns = discounted_return(gravity, discount, steps=steps)
+    optimum = optimal_return(gravity, steps=steps)
     assert (optimum - returns).mean() == pytest.approx(cost, abs=0.02)
     assert (returns < optimum + 0.05).all()
     assert not solved

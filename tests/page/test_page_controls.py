@@ -116,7 +116,7 @@ def test_score_stays_while_time_runs_on(pages: dict[str, str], player: Player) -
     player.wait(lambda: player.state()["over"])
     score = player.text("score")
     assert score.startswith("Score: network −")
-    player.wait(lambda: player.state()["steps"] == 1)  # the next episode, after a rest
+    player.wait(lambda: not player.state()["over"])  # the next episode, after a rest
     assert player.text("score") == score
 
 

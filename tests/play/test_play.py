@@ -316,8 +316,8 @@ def test_strip_along_the_lower_edge_grows_with_the_episode(no_window: None) -> N
 @pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 40.0])
 def test_invalid_torque_is_refused_before_the_environment(torque: float) -> None:
     class ResetOnly:
-        def reset(self, seed: int) -> tuple[None, None]:
-            return None, None
+        def reset(self, seed: int) -> tuple[tuple[float, ...], None]:
+            return (1.0, 0.0, 0.0), None
 
     episode = ManualEpisode(ResetOnly(), seed=0)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="expected a number from -2 to 2"):

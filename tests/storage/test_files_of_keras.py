@@ -138,11 +138,11 @@ def test_evaluate_takes_the_activation_or_warns_in_one_line(
 
 
 @pytest.mark.parametrize("name", ["elu", "Add"])
-def test_evaluate_refuses_another_network_in_one_line(
+def test_page_refuses_another_network_in_one_line(
     name: str, command: Command, tmp_path: Path
 ) -> None:
     NETWORKS[name].model(keras).save(tmp_path / "a.keras")
-    done = command("evaluate", "a.keras")
+    done = command("page", "a.keras")
     (line,) = done.stderr.splitlines()
     assert (done.returncode, done.stdout) == (2, "")
     assert line.startswith("error: ")

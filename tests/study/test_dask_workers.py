@@ -94,10 +94,10 @@ def test_job_that_kills_every_worker_fails_after_three_attempts_and_no_other_job
     assert all(line.endswith(", interrupting arm, seed 0") for line in lines)
 
 
-def listening_addresses() -> set[str]:
+def listening_sockets() -> set[tuple[str, int]]:
     this_process = psutil.Process()
     return {
-        connection.laddr.ip
+        (connection.laddr.ip, connection.laddr.port)
         for process in [this_process, *this_process.children(recursive=True)]
         for connection in process.net_connections("inet")
         if connection.status == psutil.CONN_LISTEN
@@ -105,10 +105,10 @@ def listening_addresses() -> set[str]:
 
 
 def test_local_workers_use_one_thread_and_only_this_machine_reaches_them() -> None:
-    before = listening_addresses()
+    before = listening_sockets()
     with local_workers(1) as client:
         finished = list(run_all(client, describe_worker, map(make_job, range(3))))
-        assert listening_addresses() - before == {"127.0.0.1"}
+        assert {address for address, _ in listening_sockets() - before} == {"127.0.0.1"}
         assert dashboard(client) is None
     assert {each.reply.result for each in finished if each.reply} == {b"1"}
     assert len({each.reply.worker for each in finished if each.reply}) == 1

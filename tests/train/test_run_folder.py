@@ -50,7 +50,7 @@ def test_run_leaves_its_four_files(tmp_path: Path) -> None:
     assert [float(row["episode_return"]) for row in rows] == returns
     assert rows[40]["loss"] == ""
     assert float(rows[41]["loss"]) > 0
-    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("9200", "150")
+    assert (rows[-1]["environment_steps"], rows[-1]["updates"]) == ("4600", "200")
 
     picture = matplotlib.image.imread(folder / "rewards.png")
     assert picture.shape[0] > 300
@@ -290,8 +290,10 @@ def test_picture_shows_the_optimal_and_the_random_return(
 ) -> None:
     drawn: list[tuple[float, float]] = []
 
-    def draw(history: Any, environment: str, returns: dict[str, float], planes: Any) -> bytes:
-        assert list(returns) == ["best possible", "random actions"]
+    def draw(
+        history: Any, environment: str, returns: dict[str, float], planes: Any, title: str
+    ) -> bytes:
+        assert title.startswith(f"{preset}, seed 0: regret ")
         drawn.append((returns["best possible"], returns["random actions"]))
         return b"a picture"
 

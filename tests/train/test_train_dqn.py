@@ -176,7 +176,7 @@ def test_environment_gets_finite_torques_within_their_limits(
     network = kp.train_dqn(kp.preset(name, episodes=3, hidden_units=(8,))).network
     kp.evaluate_policy(network, 1)
     taken = np.array(torques)
-    assert taken.shape == (800, 1)
+    assert len(taken) == 3 * kp.preset(name).max_episode_steps + 200
     assert (np.abs(taken) <= 2).all()
     assert len(np.unique(taken)) > 20
 
