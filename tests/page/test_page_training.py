@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import json
 from itertools import pairwise
 from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
@@ -15,7 +19,7 @@ import keras_pendulum as kp
 from keras_pendulum.dqn.network import Provenance
 from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.page import build
-from keras_pendulum.page.training import training_content
+from keras_pendulum.page.training import _encode, training_content
 from keras_pendulum.storage.snapshots import read_snapshots
 from keras_pendulum.train.checkpoint import load_history
 
@@ -81,6 +85,28 @@ def test_slider_shows_each_network_of_the_run(run: Path, page: str, player: Play
     exact = final(np.array([observation], np.float32)).numpy()[0]
     np.testing.assert_allclose(values[-1], exact, atol=1e-5)
     assert all(one != two for one, two in pairwise(values))
+
+
+def test_page_of_twenty_networks_has_at_most_eight_megabytes(
+    files: dict[str, Path], pages: dict[str, str]
+) -> None:
+    network = kp.load_weights(files["reference"])
+    arrays = network.get_weights()
+    weights = np.concatenate([array.ravel() for array in arrays]).astype(np.float16)
+    one = len(json.dumps(_encode(weights, [array.shape for array in arrays])))
+    page = Path(url2pathname(urlsplit(pages["reference"]).path)).stat().st_size
+    assert page < 1_500_000
+    curve = 500 * len("-0.1234, ")
+    assert page + 19 * one + curve < 7_950_000  # of 8 MB; a long name needs some space too
+
+
+def test_page_reads_every_finite_half_float(pages: dict[str, str], player: Player) -> None:
+    halves = np.arange(2**16, dtype=np.uint16).view(np.float16)
+    halves = halves[np.isfinite(halves)]
+    player.open(pages["small"])
+    text = base64.b64encode(halves.astype("<f2").tobytes()).decode()
+    found = player.run("return Array.from(decodedHalves(arguments[0]))", text)
+    np.testing.assert_array_equal(np.array(found, np.float32), halves.astype(np.float32))
 
 
 def test_map_and_cursor_move_with_the_slider(run: Path, page: str, player: Player) -> None:

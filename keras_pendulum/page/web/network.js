@@ -73,6 +73,15 @@ function decodedFloats(text) {
   return new Float32Array(decodedBytes(text).buffer); // little-endian, like every machine with a browser
 }
 
+/** Returns the numbers of a text in base64 of float16, which not every browser has an array for. */
+function decodedHalves(text) {
+  return Float32Array.from(new Uint16Array(decodedBytes(text).buffer), (bits) => {
+    const [sign, exponent, fraction] = [bits >> 15 ? -1 : 1, (bits >> 10) & 31, bits & 1023];
+    if (exponent === 0) return sign * fraction * 2 ** -24;
+    return sign * (1024 + fraction) * 2 ** (exponent - 25);
+  });
+}
+
 /** Returns the index of the highest value, the lowest index among equal ones. */
 function argmax(values) {
   let best = 0;

@@ -91,22 +91,22 @@ class Training {
     this.changed = true;
   }
 
-  /** Returns a network and its map. Each kernel weight is 12 bits, times a factor of its unit. */
+  /** Returns a network and its map. The 12 bits of a weight are its share of its unit's largest. */
   #decoded(index) {
-    const { kernels, floats } = this.recorded.training.networks[index];
+    const { kernels, halves } = this.recorded.training.networks[index];
     const { sizes } = this.recorded;
-    const [factorsAndBiases, weights] = [decodedFloats(floats), []];
+    const [largestAndBiases, weights] = [decodedHalves(halves), []];
     let [place, start] = [0, 0];
     for (let layer = 1; layer < sizes.length; layer++) {
       const [inputs, units] = [sizes[layer - 1], sizes[layer]];
-      const factors = factorsAndBiases.subarray(start, start + units);
+      const largest = largestAndBiases.subarray(start, start + units);
       const kernel = new Float32Array(inputs * units);
       for (let i = 0; i < kernel.length; i++, place += 2) {
         const high = SIX_BITS[kernels.charCodeAt(place)];
         const low = SIX_BITS[kernels.charCodeAt(place + 1)];
-        kernel[i] = (64 * high + low - 2048) * factors[i % units];
+        kernel[i] = ((64 * high + low - 2048) / 2047) * largest[i % units];
       }
-      weights.push(kernel, factorsAndBiases.subarray(start + units, start + 2 * units));
+      weights.push(kernel, largestAndBiases.subarray(start + units, start + 2 * units));
       start += 2 * units;
     }
     const numbers = new Float32Array(weights.reduce((sum, { length }) => sum + length, 0));
