@@ -6,7 +6,15 @@ function mapPicture(map, colours) {
   picture.width = picture.height = map.size;
   const context = picture.getContext("2d");
   const image = context.createImageData(map.size, map.size);
-  map.torques.forEach((torque, i) => image.data.set([...colours.ofTorque(torque), 255], 4 * i));
+  const pixels = new Uint32Array(image.data.buffer); // little-endian
+  const seen = new Map(); // a map has few different torques
+  map.torques.forEach((torque, i) => {
+    if (!seen.has(torque)) {
+      const [red, green, blue] = colours.ofTorque(torque);
+      seen.set(torque, (255 << 24) | (blue << 16) | (green << 8) | red);
+    }
+    pixels[i] = seen.get(torque);
+  });
   context.putImageData(image, 0, 0);
   return picture;
 }
