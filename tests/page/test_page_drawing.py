@@ -67,9 +67,9 @@ def test_every_torque_has_a_bar_and_the_highest_is_the_greedy_one(
     q = np.array(state["qValues"])
     assert state["best"] == q.argmax()
     assert tops[state["best"]] == tops.min()  # another bar may have the same height in pixels
-    lowest, highest = player.run("return pendulum.page.view.limits")
+    lowest = player.run("return pendulum.page.view.floor")
     scale = reward_scale(kp.find_weights("swingup"))
-    heights = (q / scale - lowest) / (highest - lowest)
+    heights = 1 - (q - q.max()) / scale / lowest
     floor = picture.shape[0] - 38 - 4 - 13  # a bar for the lowest value has 4 px
     np.testing.assert_allclose(1 - (tops + 1) / (floor + 1), heights, atol=0.03)
     value = player.text("best").split(": ")[1].replace("−", "-")
@@ -89,15 +89,32 @@ def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(
 ) -> None:
     player.open(pages["small"])
 
-    def limits(low: float, high: float, before: list[float] | None) -> list[float]:
-        found: list[float] = player.run(
-            "return steadyLimits([arguments[0], arguments[1]], arguments[2])", low, high, before
-        )
-        return found
+    def floor(lowest: float, before: float | None = None) -> float:
+        return float(player.run("return steadyFloor(arguments[0], arguments[1])", lowest, before))
 
-    assert limits(-13.2, -2.4, None) == [-15, 0]
-    assert limits(-11, -8, [-15, 0]) == [-15, 0]
-    assert limits(-11, -8.5, [-15, 0]) == [-11, -8]
-    assert limits(-15.1, -2.4, [-15, 0]) == [-20, 0]
-    low, high = limits(-1, -1, None)  # equal values need an axis too
-    assert low <= -1 <= high and low < high
+    assert floor(-3.4) == -5
+    assert floor(-5) == -5
+    assert floor(-13.2) == -20
+    assert floor(-0.013) == pytest.approx(-0.02)
+    assert floor(-1.1, -5) == -5  # fills a fifth of the axis
+    assert floor(-0.9, -5) == -1
+    assert floor(-5.1, -5) == -10
+    assert floor(0) == pytest.approx(-0.001)  # equal values need an axis too
+
+
+@pytest.mark.parametrize("name", ["reference", "swingup"])
+def test_axis_of_the_bars_moves_a_few_times_in_an_episode(
+    name: str, pages: dict[str, str], player: Player
+) -> None:
+    player.open(pages[name])
+    player.press(Keys.SPACE)
+    moves = player.run(
+        "const {view, episode} = pendulum.page; let [moves, before] = [0, null];"
+        "pendulum.reset(2.5, 0);"
+        "for (let i = 0; i < 200; i++) {"
+        "  pendulum.step(); view.drawRest();"
+        "  moves += view.floor !== before; before = view.floor;"
+        "}"
+        "return moves"
+    )
+    assert 1 <= moves <= 20  # an axis from the lowest to the highest value moved in 50 steps

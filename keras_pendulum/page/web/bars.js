@@ -1,48 +1,42 @@
 "use strict";
 
 /**
- * Returns round limits of an axis for `values`. The limits `before` stay as long as the values are
- * within them and fill a fifth of them, so that the axis does not move with every step.
+ * Returns a round lower end of the axis of the Q-values below the best one, of which `lowest` is the
+ * lowest. The end `before` stays as long as the values fill a fifth of the axis: the Q-values of a
+ * state differ much less than those of different states, so the axis moves a few times an episode.
  */
-function steadyLimits(values, before) {
-  const [lowest, highest] = [Math.min(...values), Math.max(...values)];
-  const span = Math.max(highest - lowest, 1e-3);
-  if (before && lowest >= before[0] && highest <= before[1] && 5 * span >= before[1] - before[0]) {
-    return before;
-  }
-  const power = 10 ** Math.floor(Math.log10(span / 2));
-  const unit = power * [5, 2, 1].find((factor) => factor * power <= span / 2);
-  const low = Math.floor(lowest / unit) * unit;
-  return [low, Math.max(Math.ceil(highest / unit) * unit, low + unit)];
+function steadyFloor(lowest, before) {
+  const span = Math.max(-lowest, 1e-3);
+  if (before && span <= -before && 5 * span >= -before) return before;
+  const power = 10 ** Math.floor(Math.log10(span));
+  return -power * [1, 2, 5, 10].find((factor) => factor * power >= span * 0.999999);
 }
 
-/** Draws a bar for the Q-value of each torque between the `limits`, and marks `taken`. */
-function drawBars(canvas, colours, torques, qValues, limits, best, taken) {
+/** Draws a bar for the Q-value of each torque, from `floor` below the best up, and marks `taken`. */
+function drawBars(canvas, colours, torques, qValues, floor, best, taken) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = [76, width - 6, 12, height - 38];
-  const [lowest, highest] = limits;
   const pitch = (right - left) / torques.length;
   const middle = (i) => left + (i + 0.5) * pitch;
-  const floor = bottom - 4; // the lowest bar stays visible
+  const lowest = bottom - 4; // y of the floor; the lowest bar stays visible
 
   context.strokeStyle = colours.line;
   context.lineWidth = 1;
   line(context, [[left, top], [right, top]]);
   line(context, [[left, bottom], [right, bottom]]);
   context.fillStyle = colours.soft;
-  const digits = clipped(Math.max(1 - Math.floor(Math.log10(highest - lowest)), 0), 4);
-  for (const [value, y] of [[highest, top], [lowest, floor]]) {
-    write(context, shown(value, digits), left - 6, y, "right");
+  const digits = Math.max(-Math.floor(Math.log10(-floor)), 0);
+  for (const [value, y] of [[0, top], [floor, lowest]]) {
+    write(context, shown(value, value && digits), left - 6, y, "right");
   }
   context.save();
   context.translate(12, (top + bottom) / 2);
   context.rotate(-Math.PI / 2);
-  write(context, "Q (return)", 0, 0);
+  write(context, "Q − best Q", 0, 0);
   context.restore();
 
   qValues.forEach((value, i) => {
-    const share = (value - lowest) / (highest - lowest);
-    const y = floor - share * (floor - top);
+    const y = top + ((value - qValues[best]) / floor) * (lowest - top);
     const [x, wide] = [middle(i) - pitch * 0.41, pitch * 0.82];
     context.fillStyle = i === best ? colours.ink : `rgb(${colours.ofTorque(torques[i])})`;
     context.fillRect(x, y, wide, bottom - y);

@@ -55,11 +55,11 @@ class View {
     element("optimum").textContent = page.held ? "–" : shown(page.optimalReturn, 1);
     const { best, youDrive, yourTorque } = episode;
     const values = Array.from(episode.qValues, (value) => value / page.recorded.rewardScale);
-    this.limits = steadyLimits(values, this.limits);
+    this.floor = steadyFloor(Math.min(...values) - values[best], this.floor);
     const greedy = `${shown(torques[best], this.digits, true)} N·m`;
     element("best").textContent = `${greedy}: ${shown(values[best], 2)}`;
     const taken = youDrive ? yourTorque : torques[best];
-    drawBars(element("bars"), colours, torques, values, this.limits, best, taken);
+    drawBars(element("bars"), colours, torques, values, this.floor, best, taken);
     this.picture ??= mapPicture(page.map, colours);
     const paths = page.episodes.map(({ path }) => path);
     drawPortrait(element("portrait"), colours, this.picture, paths);
