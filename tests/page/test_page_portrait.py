@@ -49,7 +49,22 @@ def test_map_shows_the_greedy_torque_of_every_state(
         )
         torque = found.reshape(size, size)[row, column]
         expected = player.run("return pendulum.page.view.colours.ofTorque(arguments[0])", torque)
-        assert picture[pixel].tolist() == expected
+        row, column = pixel  # beside the lines of the hatching
+        assert expected in picture[row, column - 2 : column + 3].tolist()
+
+
+def test_clockwise_torques_are_hatched(pages: dict[str, str], player: Player) -> None:
+    player.open(pages["small"])
+    colours = player.run(
+        "const count = (torque) => {"
+        "  const map = {size: 97, torques: new Float32Array(97 * 97).fill(torque)};"
+        "  const picture = mapPicture(map, pendulum.page.view.colours, 200, 100);"
+        "  const {data} = picture.getContext('2d').getImageData(0, 0, 200, 100);"
+        "  return new Set(new Uint32Array(data.buffer)).size;"
+        "};"
+        "return [-2, -0.1, 0, 2].map(count)"
+    )
+    assert min(colours[:2]) > 1 == max(colours[2:])
 
 
 def test_path_passes_every_state_and_leaves_the_map_only_at_the_edge(

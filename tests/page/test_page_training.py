@@ -120,8 +120,18 @@ def test_map_and_cursor_move_with_the_slider(run: Path, page: str, player: Playe
         if index == 1:
             ink = pixels_of(player, "curve", "ink")
             column = ink.sum(axis=0).argmax()
-            assert (column - 8) / (ink.shape[1] - 16) == pytest.approx(2 / 8, abs=0.01)
+            assert (column - 48) / (ink.shape[1] - 56) == pytest.approx(2 / 8, abs=0.01)
     assert maps[0] == maps[2] != maps[1]
+
+
+def test_slider_and_curve_have_the_same_ends(page: str, player: Player) -> None:
+    player.open(page)
+    curve, slider = player.run(
+        "return ['curve', 'snapshot'].map(id => document.getElementById(id))"
+        ".map(e => e.getBoundingClientRect()).map(r => [r.left, r.right])"
+    )
+    axis = player.run("return CURVE_AXIS")
+    assert slider == pytest.approx([curve[0] + axis, curve[1]], abs=0.5)
 
 
 def test_a_key_plays_the_training_from_its_start(page: str, player: Player) -> None:

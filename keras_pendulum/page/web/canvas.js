@@ -5,7 +5,7 @@ function readColours() {
   const style = getComputedStyle(document.documentElement);
   const names = ["card", "ink", "soft", "line", "rod", "accent", "minus", "none", "plus", "path"];
   const colours = Object.fromEntries(
-    [...names, "halo"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
+    [...names, "halo", "hatch"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
   );
   const channels = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
   const [minus, none, plus] = [colours.minus, colours.none, colours.plus].map(channels);

@@ -1,5 +1,6 @@
 "use strict";
 
+const CURVE_AXIS = 40; // px for the numbers beside the curve; training.css indents the slider as much
 const HALF_THUMB = 8; // px, of the slider below the curve
 
 /** Returns the value of a curve of evenly spaced points at a share of its length. */
@@ -10,16 +11,19 @@ function curveValue(curve, share) {
 /** Draws the learning curve, and a cursor at the episode `here`. */
 function drawCurve(canvas, colours, curve, here, end) {
   const { context, width, height } = blank(canvas);
-  const [left, right, top, bottom] = [HALF_THUMB, width - HALF_THUMB, 4, height - 4];
+  const [left, right, top, bottom] = [CURVE_AXIS + HALF_THUMB, width - HALF_THUMB, 5, height - 5];
   const [lowest, highest] = [Math.min(...curve), Math.max(...curve)];
   const x = (share) => left + share * (right - left);
   const y = (value) => bottom - ((value - lowest) / (highest - lowest || 1)) * (bottom - top);
 
   context.fillStyle = colours.soft;
   context.font = "11px system-ui, sans-serif";
-  const room = 4; // px between a number and the edge
-  write(context, shown(highest, 1), left + room, top, "left", "top");
-  write(context, `${shown(lowest, 1)} a step`, right, bottom, "right", "bottom");
+  for (const value of [highest, lowest]) {
+    write(context, shown(value, 1), CURVE_AXIS - 4, y(value), "right");
+  }
+  context.strokeStyle = colours.line;
+  context.lineWidth = 1;
+  line(context, [[CURVE_AXIS, top], [CURVE_AXIS, bottom], [right, bottom]]);
   context.strokeStyle = colours.accent;
   context.lineWidth = 2;
   line(context, curve.map((value, i) => [x(i / (curve.length - 1 || 1)), y(value)]));

@@ -1,17 +1,46 @@
 "use strict";
 
-/** Returns the torque map as a picture with one pixel per cell. */
-function mapPicture(map, colours) {
-  const picture = document.createElement("canvas");
-  picture.width = picture.height = map.size;
+const HATCH = 9; // px between two lines
+
+/**
+ * Returns the torque map as a picture of `width` x `height` pixels. The torques below 0 are hatched,
+ * because both directions are equally dark.
+ */
+function mapPicture(map, colours, width, height) {
+  const picture = new OffscreenCanvas(width, height);
+  const context = picture.getContext("2d");
+  context.imageSmoothingEnabled = false;
+  // The centres of the outer cells lie on the edges.
+  const [cellX, cellY] = [width / (map.size - 1), height / (map.size - 1)];
+  const draw = (colourOf) =>
+    context.drawImage(cells(map, colourOf), -cellX / 2, -cellY / 2, width + cellX, height + cellY);
+  draw((torque) => (torque < 0 ? [0, 0, 0, 255] : [0, 0, 0, 0]));
+  context.globalCompositeOperation = "source-in"; // lines there, and nothing elsewhere
+  context.strokeStyle = colours.hatch;
+  const sharpness = window.devicePixelRatio || 1;
+  context.lineWidth = 1.2 * sharpness;
+  context.beginPath();
+  for (let x = -height; x < width; x += HATCH * sharpness) {
+    context.moveTo(x, height);
+    context.lineTo(x + height, 0);
+  }
+  context.stroke();
+  context.globalCompositeOperation = "destination-over";
+  draw((torque) => [...colours.ofTorque(torque), 255]);
+  return picture;
+}
+
+/** Returns a picture with one pixel for each torque of a map; `colourOf` returns RGBA. */
+function cells(map, colourOf) {
+  const picture = new OffscreenCanvas(map.size, map.size);
   const context = picture.getContext("2d");
   const image = context.createImageData(map.size, map.size);
   const pixels = new Uint32Array(image.data.buffer); // little-endian
   const seen = new Map(); // a map has few different torques
   map.torques.forEach((torque, i) => {
     if (!seen.has(torque)) {
-      const [red, green, blue] = colours.ofTorque(torque);
-      seen.set(torque, (255 << 24) | (blue << 16) | (green << 8) | red);
+      const [red, green, blue, alpha] = colourOf(torque);
+      seen.set(torque, (alpha << 24) | (blue << 16) | (green << 8) | red);
     }
     pixels[i] = seen.get(torque);
   });
@@ -24,10 +53,14 @@ function portraitEdges(width, height) {
   return [46, width - 10, 8, height - 40];
 }
 
-/** Draws the phase plane: the map, and the paths of [θ, θ̇] over it, the second one dashed. */
-function drawPortrait(canvas, colours, picture, paths) {
+/**
+ * Draws the phase plane: the map, and the paths of [θ, θ̇] over it, the second one dashed.
+ * `pictureOf` returns the map's picture for its width and height in pixels.
+ */
+function drawPortrait(canvas, colours, pictureOf, paths) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = portraitEdges(width, height);
+  const sharpness = canvas.width / width;
   const x = (theta) => left + ((theta / Math.PI + 1) / 2) * (right - left);
   const y = (thetadot) => top + ((1 - thetadot / MAX_SPEED) / 2) * (bottom - top);
 
@@ -35,16 +68,10 @@ function drawPortrait(canvas, colours, picture, paths) {
   context.beginPath();
   context.rect(left, top, right - left, bottom - top);
   context.clip();
-  // The centres of the outer cells lie on the edges.
-  const [cellX, cellY] = [(right - left) / (picture.width - 1), (bottom - top) / (picture.height - 1)];
   context.imageSmoothingEnabled = false;
-  context.drawImage(
-    picture,
-    left - cellX / 2,
-    top - cellY / 2,
-    right - left + cellX,
-    bottom - top + cellY,
-  );
+  const size = [right - left, bottom - top];
+  const picture = pictureOf(...size.map((length) => Math.max(Math.round(length * sharpness), 1)));
+  context.drawImage(picture, left, top, ...size);
   paths.forEach((path, i) => {
     for (const [colour, thickness] of [[colours.halo, 4.5], [colours.path, 2]]) {
       context.strokeStyle = colour;

@@ -6,8 +6,8 @@
  */
 function drawPendulum(canvas, colours, theta, torque, trail) {
   const { context, width, height } = blank(canvas);
-  const narrow = width < 230; // no room for the labels at the sides
-  const rod = Math.min(width / 2 - (narrow ? 14 : 52), height / 2 - 28);
+  const rod = Math.min(width / 2 - 14, height / 2 - 28);
+  const labelled = width / 2 - rod >= 52; // the sides have labels where they make it no smaller
   context.translate(width / 2, height / 2);
   const at = (angle, radius) => [-Math.sin(angle) * radius, -Math.cos(angle) * radius];
 
@@ -23,7 +23,7 @@ function drawPendulum(canvas, colours, theta, torque, trail) {
   context.fillStyle = colours.soft;
   write(context, "0", 0, -rod - 18);
   write(context, "±π", 0, rod + 20);
-  if (!narrow) {
+  if (labelled) {
     write(context, "π/2", -rod - 18, 0, "right");
     write(context, "−π/2", rod + 18, 0, "left");
   }

@@ -60,8 +60,12 @@ class View {
     element("best").textContent = `${greedy}: ${shown(values[best], 2)}`;
     const taken = youDrive ? yourTorque : torques[best];
     drawBars(element("bars"), colours, torques, values, this.floor, best, taken);
-    this.picture ??= mapPicture(page.map, colours);
+    const pictureOf = (width, height) => {
+      const { picture } = this;
+      if (picture?.width === width && picture.height === height) return picture;
+      return (this.picture = mapPicture(page.map, colours, width, height));
+    };
     const paths = page.episodes.map(({ path }) => path);
-    drawPortrait(element("portrait"), colours, this.picture, paths);
+    drawPortrait(element("portrait"), colours, pictureOf, paths);
   }
 }
