@@ -23,6 +23,7 @@ _STYLES = (
     {"color": "#E69F00", "hatch": "//", "line": "-."},  # what it is compared with
 )
 _CELLS = 48  # of the map, on each axis
+_LINE = "line: the optimal torque changes its side"  # in the title, where it hides nothing
 
 
 def draw(
@@ -100,7 +101,7 @@ def _draw_starts(axes: Axes, episodes: Sequence[Episodes]) -> None:
         vmax=np.quantile(regrets, 0.95),
     )
     axes.figure.colorbar(points, ax=axes, label="Mean regret of the start", extend="max")
-    axes.set(title="By start")
+    axes.set(title=f"By start; {_LINE}")
 
 
 def _draw_states(axes: Axes, episodes: Sequence[Episodes]) -> None:
@@ -120,7 +121,7 @@ def _draw_states(axes: Axes, episodes: Sequence[Episodes]) -> None:
         vmax=np.quantile(share, 0.995),
     )
     axes.figure.colorbar(picture, ax=axes, label="Share of the regret, %", extend="max")
-    axes.set(title="By state")
+    axes.set(title=f"By state; {_LINE}")
 
 
 def _draw_sides(axes: Axes, gravity: float, value: NDArray[Any], reach: float) -> None:
@@ -131,6 +132,4 @@ def _draw_sides(axes: Axes, gravity: float, value: NDArray[Any], reach: float) -
     reward, next_theta, next_speed = step_all_torques(gravity, *states)
     best = (reward + value_at(value, next_theta, next_speed)).argmax(axis=1)
     axes.contour(theta, speed, TORQUES[best].reshape(grid[0].shape), [0.0], colors="#D55E00")
-    axes.plot([], [], color="#D55E00", label="optimal torque changes its side")
     axes.set(xlabel="θ, rad (0 is upright)", ylabel="θ̇, rad/s", ylim=(-reach, reach))
-    axes.legend(loc="upper right", fontsize="small")

@@ -200,7 +200,7 @@ def _draw_planes(figure: Figure, place: SubplotSpec, planes: Mapping[str, PhaseP
             if attribute == "torque":
                 _hatch_clockwise(axes, values)
             axes.set_yticks([-8, -4, 0, 4, 8])
-            axes.set_xticks([-np.pi, 0, np.pi], ["-π", "0 (upright)", "π"])
+            axes.set_xticks([-np.pi, 0, np.pi], ["−π", "0 (upright)", "π"])
             axes.set(title=name, xlabel="θ (rad)", ylabel="θ̇ (rad/s)")
             axes.title.set_fontsize("medium")
             row_axes.append(axes)
