@@ -89,7 +89,9 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.resume:
         if arguments.preset:
             settings["preset"] = arguments.preset
-        config = replace(load_config(RunFolder(out).weights), **settings)
+        resumed = RunFolder(out)
+        resumed.require_run()
+        config = replace(load_config(resumed.weights), **settings)
     init = None
     if arguments.init:
         init = load_weights(find_weights(arguments.init), config.activation)
