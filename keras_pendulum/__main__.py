@@ -76,7 +76,7 @@ def _list(prog: str, words: Sequence[str]) -> int:
     if words and not words[0].startswith("-"):
         parser.error(
             f"unknown command {words[0]!r}; expected one of {', '.join(COMMANDS)}"
-            f"{did_you_mean(words[0], COMMANDS)}"
+            f"{did_you_mean(words[0], [*COMMANDS, '--help', '--version'])}"
         )
     parser.parse_args(words)
     parser.print_help()

@@ -12,7 +12,7 @@ import shlex
 import signal
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NoReturn
 
 from keras_pendulum.errors import UserError, did_you_mean, one_line
@@ -27,8 +27,10 @@ class OneLineParser(argparse.ArgumentParser):
     """
 
     def __init__(self, help_all: bool = False, **options: Any) -> None:
-        super().__init__(**options)
+        # With abbreviations, a new flag could make the user's own command ambiguous.
+        super().__init__(allow_abbrev=False, **options)
         self._hidden: dict[argparse.Action, str | None] = {}  # help texts that `--help` leaves out
+        self._values: dict[str, str] = {}  # flags by one of their values
         if help_all:
             self.add_argument("--help-all", action=_HelpAll, nargs=0, help="show all flags")
 
@@ -36,6 +38,10 @@ class OneLineParser(argparse.ArgumentParser):
         """Leaves a flag out of `--help`; `--help-all` and shell completion show it."""
         self._hidden[action] = action.help
         action.help = argparse.SUPPRESS
+
+    def suggest_flag(self, flag: str, values: Iterable[str]) -> None:
+        """Suggests the flag where one of its values is typed without it."""
+        self._values |= dict.fromkeys(values, flag)
 
     def show_hidden(self) -> None:
         """Shows all flags from now on."""
@@ -57,11 +63,16 @@ class OneLineParser(argparse.ArgumentParser):
             argcomplete.autocomplete(self)
         arguments, unknown = self.parse_known_args(*words)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._similar_flag(unknown)}")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._suggestion(unknown)}")
         return arguments
 
-    def _similar_flag(self, words: list[str]) -> str:
-        """Returns "; did you mean FLAG?" for the first mistyped flag among the words, or ""."""
+    def _suggestion(self, words: list[str]) -> str:
+        """Returns "; did you mean FLAG?" for the first mistyped flag among the words, or "".
+
+        If the first word is the value of a flag, it is the flag with that value.
+        """
+        if words[0] in self._values:
+            return f"; did you mean {self._values[words[0]]} {words[0]}?"
         known = [
             flag
             for action in self._actions
@@ -189,6 +200,12 @@ def nonempty_path(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("the name is empty")
     return text
+
+
+def require_ending(flag: str, path: str, ending: str) -> None:
+    """Raises UserError when the name of a file does not end in `ending`, such as ".png"."""
+    if not path.lower().endswith(ending):
+        raise UserError(f"{flag} is {path}: expected a name that ends in {ending}")
 
 
 def shell_word(path: str | os.PathLike[str]) -> str:

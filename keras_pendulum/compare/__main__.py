@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.cli import OneLineParser, nonempty_path, require_ending, run_command
 from keras_pendulum.compare.folders import find_checkpoints
 from keras_pendulum.completion import complete_with, folders
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
@@ -29,8 +29,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "--out",
         type=nonempty_path,
         default="comparison.png",
-        metavar="FILE",
-        help="file of the figure, a PNG [comparison.png]",
+        metavar="FILE.png",
+        help="file of the figure [comparison.png]",
     )
     complete_with(runs, folders)
     arguments = parser.parse_args(argv)
@@ -40,6 +40,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 def _compare(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     require_no_other_file(Path(arguments.out), b"\x89PNG", "a PNG")
+    require_ending("--out", arguments.out, ".png")
     checkpoints = find_checkpoints(arguments.folders)
 
     with fast_import():

@@ -55,7 +55,7 @@ class Integers:
     low: int
     high: int
 
-    expected: ClassVar[str] = "a list of whole numbers"
+    expected: ClassVar[str] = "whole numbers with commas, such as 64,64"
 
     def parse(self, text: str) -> Any:
         """Returns the numbers of "512,256,128". Raises ValueError for other text."""

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from keras_pendulum.cli import nonempty_path
+from keras_pendulum.cli import nonempty_path, require_ending
 from keras_pendulum.display import draw_without_display
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 def add_film_flags(parser: argparse.ArgumentParser) -> None:
     """Adds --gif, --video and --start."""
     parser.add_argument(
-        "--gif", type=nonempty_path, metavar="FILE", help="save a film of the first episode"
+        "--gif",
+        type=nonempty_path,
+        metavar="FILE.gif",
+        help="save a film of the first episode",
     )
     parser.add_argument(
         "--video",
@@ -42,11 +45,11 @@ def require_film_files(arguments: argparse.Namespace) -> None:
         raise UserError("--start is the start of a film: add --gif FILE or --video FILE.mp4")
     if arguments.gif:
         require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
+        require_ending("--gif", arguments.gif, ".gif")
     if arguments.video:
         from keras_pendulum.evaluate.film import find_ffmpeg
 
-        if not arguments.video.lower().endswith(".mp4"):
-            raise UserError(f"--video is {arguments.video}: expected a name that ends in .mp4")
+        require_ending("--video", arguments.video, ".mp4")
         require_no_other_file(Path(arguments.video), b"ftyp", "an MP4", offset=4)
         find_ffmpeg()
 

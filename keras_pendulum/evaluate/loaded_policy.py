@@ -60,7 +60,7 @@ class Policy:
 
     def predict(
         self,
-        observation: ArrayLike,
+        observation: Any,  # the protocol of Stable-Baselines3 allows a dict too
         state: Any = None,
         episode_start: Any = None,
         deterministic: bool = True,

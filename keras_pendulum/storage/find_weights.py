@@ -25,6 +25,10 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
         for candidate in (folder / name, folder / f"{name}.h5"):
             if path.name == name and candidate.is_file():
                 return candidate
+    if path.is_dir():
+        files = sorted(file.name for file in path.glob("*.h5"))
+        example = f", such as {path / files[0]}" if files else ""
+        raise WeightsError(f"{name}: a folder; expected a weights file (.h5){example}")
     problem = "not a file" if path.exists() else "no such file"
     meant = did_you_mean(name, shipped_names())
     raise WeightsError(f"{name}: {problem}; expected a weights file (.h5){meant}")

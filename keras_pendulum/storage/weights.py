@@ -146,7 +146,7 @@ def load_weights(path: str | os.PathLike[str], activation: str | None = None) ->
     elif activation not in (None, recorded):
         raise WeightsError(
             f"{name}: records the activation {recorded}, not {activation}, for "
-            f"{provenance.environment}"
+            f"{provenance.environment}: give it with --activation {recorded}"
         )
     widths = [layer.bias.shape[0] for layer in layers]
     network = DQN(

@@ -58,6 +58,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "--tensorboard", action="store_true", help="write DIR/tensorboard (extra `tensorboard`)"
     )
     add_config_flags(parser)
+    parser.suggest_flag("--preset", PRESETS)
     complete_with(preset_flag, names(PRESETS))
     complete_with(init_flag, weights_files(shipped_names))
     complete_with(out_flag, folders)
@@ -89,7 +90,9 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.resume:
         if arguments.preset:
             settings["preset"] = arguments.preset
-        config = replace(load_config(RunFolder(out).weights), **settings)
+        resumed = RunFolder(out)
+        resumed.require_run()
+        config = replace(load_config(resumed.weights), **settings)
     init = None
     if arguments.init:
         init = load_weights(find_weights(arguments.init), config.activation)

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from keras_pendulum.train.run_folder import RunFolder
     from keras_pendulum.train.train_dqn import TrainingResult
 
+# The presets that learn have 0.24 to 0.5, those of the two listings 0.005.
+_FEW_UPDATES_PER_STEP = 0.1
+
 
 def closing_lines(
     config: Config,
@@ -50,7 +53,7 @@ def closing_lines(
         steps = TASKS[score.environment].steps_per_episode
         random = random_return(score.environment, score.gravity, steps)
         lines += [score.summary(), f"Uniformly random actions on the same starts: {random:.2f}"]
-        lines += _warnings(config, last, score.mean_return, random)
+        lines += _warnings(config, last, score.mean_return, random, folder)
     saved = ", ".join(file.name for file in folder.files if file.exists())
     lines.append(f"Saved in {folder.path}: {saved}")
     commands = _next_commands(config, result, folder, extend=not new_episodes)
@@ -73,43 +76,61 @@ def _evaluations(history: list[EpisodeRecord]) -> list[str]:
     ]
 
 
-def _warnings(config: Config, last: EpisodeRecord, mean: float, random: float) -> list[str]:
+def _warnings(
+    config: Config, last: EpisodeRecord, mean: float, random: float, folder: RunFolder
+) -> list[str]:
     """Returns a line for a run without updates, or for a policy that is worse than random.
 
     The line says why, and which setting to change.
     """
     if last.updates == 0:
-        return [f"The policy has learned nothing, because {_why_no_update(config, last)}"]
+        return [f"The policy has learned nothing, because {_why_no_update(config, last, folder)}"]
     if mean < random:
-        return [f"The policy is worse than random actions. {_why_bad(config, last)}"]
+        return [f"The policy is worse than random actions. {_why_bad(config, last, folder)}"]
     return []
 
 
-def _why_no_update(config: Config, last: EpisodeRecord) -> str:
+def _why_no_update(config: Config, last: EpisodeRecord, folder: RunFolder) -> str:
     episodes, warmup = last.episode + 1, config.warmup_episodes
+    needed = max(_more_episodes(config), 2 * warmup)
+    longer = f"Continue it with {_resume_words(folder)} --episodes {needed}"
     if config.train_frequency == "episode" and episodes <= warmup:
         return (
-            f"the run made no update: the first one comes after episode {warmup}, and the run has "
-            f"the episodes 0 to {last.episode}. Continue it with more episodes (--resume "
-            f"--episodes N), or start another one with a smaller --warmup-episodes (now {warmup})"
+            f"the run made no update: the first one comes after {warmup + 1} episodes, and the run "
+            f"has {episodes}. {longer}, or start another one with a smaller --warmup-episodes "
+            f"(now {warmup})"
         )
     return (
         f"the run made no update: its {last.environment_steps} transitions are fewer than one "
-        "batch. Continue it with more episodes (--resume --episodes N), or start another one with "
-        f"a smaller --batch-size (now {config.batch_size})"
+        f"batch. {longer}, or start another one with a smaller --batch-size (now "
+        f"{config.batch_size})"
     )
 
 
-def _why_bad(config: Config, last: EpisodeRecord) -> str:
-    usual = PRESETS[config.preset].episodes if config.preset in PRESETS else 0
+def _resume_words(folder: RunFolder) -> str:
+    return f"--resume --out {shell_word(folder.path)}"
+
+
+def _usual_episodes(config: Config) -> int:
+    """Returns the number of episodes of the run's preset; 0 for an unknown preset."""
+    return PRESETS[config.preset].episodes if config.preset in PRESETS else 0
+
+
+def _more_episodes(config: Config) -> int:
+    """Returns the number of episodes of the preset, for a run as long as that twice as many."""
+    usual = _usual_episodes(config)
+    return usual if usual > config.episodes else 2 * config.episodes
+
+
+def _why_bad(config: Config, last: EpisodeRecord, folder: RunFolder) -> str:
+    usual = _usual_episodes(config)
     if config.stored_index == "truncated":
         return (
             "With truncated indices, the values of two torques are never learned: try "
             "--stored-index exact"
         )
-    if config.train_frequency == "episode" and (
-        config.updates_per_episode < Config.updates_per_episode
-    ):
+    updates_per_step = config.updates_per_episode / config.max_episode_steps
+    if config.train_frequency == "episode" and updates_per_step < _FEW_UPDATES_PER_STEP:
         return (
             f"It had {last.updates} updates in {last.environment_steps} steps, which is little: "
             f"try a larger --updates-per-episode (now {config.updates_per_episode}; reference has "
@@ -118,7 +139,7 @@ def _why_bad(config: Config, last: EpisodeRecord) -> str:
     if last.episode + 1 < usual:
         return (
             f"It had {last.episode + 1} episodes; the preset {config.preset} has {usual}: "
-            f"continue with --resume --episodes {usual}"
+            f"continue with {_resume_words(folder)} --episodes {usual}"
         )
     if config.learning_rate_schedule == "constant" and config.train_frequency == "episode":
         return (
@@ -136,10 +157,10 @@ def _next_commands(
 ) -> dict[str, str]:
     """Returns the words of commands that can follow, by what they do."""
     weights = shell_word(folder.path / folder.weights.name)
-    resume = f"train --resume --out {shell_word(folder.path)}"
+    resume = f"train {_resume_words(folder)}"
     if not result.finished:
         return {"Continue": resume}
-    commands = {"Extend it": f"{resume} --episodes {2 * config.episodes}"} if extend else {}
+    commands = {"Extend it": f"{resume} --episodes {_more_episodes(config)}"} if extend else {}
     if folder.best.exists():
         best = shell_word(folder.path / folder.best.name)
         commands["Evaluate the best weights"] = f"evaluate {best}"

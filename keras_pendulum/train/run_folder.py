@@ -89,9 +89,6 @@ class RunFolder:
 
         Raises UserError when another run holds the lock.
         """
-        if not self._real_path.is_dir():
-            yield  # there is no run to resume, and the checkpoint's reader says so
-            return
         with lock_folder(self._real_path) as self.require_not_moved:
             yield
 
@@ -104,6 +101,16 @@ class RunFolder:
             raise UserError(
                 f"{self.path} already holds a run ({', '.join(used)}): continue it with --resume, "
                 "replace it with --overwrite, or name another folder with --out"
+            )
+
+    def require_run(self) -> None:
+        """Raises UserError when the folder holds no checkpoint to resume."""
+        if not self.weights.exists():
+            names = [task.weights_name for task in TASKS.values()]
+            missing = [name for name in names if not (self._real_path / name).exists()]
+            raise UserError(
+                f"{self.path} holds no run to continue (no {' or '.join(missing)}): leave out "
+                "--resume to start a run, or name the folder of one with --out"
             )
 
     def remove_old_run(self) -> None:

@@ -71,8 +71,9 @@ def train_dqn(
         ConfigError: the settings do not fit `init` or the checkpoint.
         WeightsError: the checkpoint is damaged.
         UserError: `resume` is combined with `init` or `overwrite`; `keep_best` or `snapshots` has
-            no `out`; `out` is in use, cannot be written or is moved meanwhile; or an observation, a
-            reward, a loss or a weight is not finite. The last checkpoint then holds finite weights.
+            no `out`; `out` holds no run to resume, is in use, cannot be written or is moved
+            meanwhile; or an observation, a reward, a loss or a weight is not finite. The last
+            checkpoint then holds finite weights.
         TypeError: `config` is no Config, or `init` is no DQN.
     """
     require_type("config", config, Config)
@@ -91,6 +92,7 @@ def train_dqn(
         if resume:
             if folder is None:
                 raise UserError("resume needs `out`, the folder of the run")
+            folder.require_run()
             stack.enter_context(folder.lock())
             run = load_checkpoint(folder.weights, config, render)
             stack.callback(run.env.close)

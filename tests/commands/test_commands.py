@@ -215,7 +215,7 @@ def test_pendulum_settings_are_refused_for_cartpole(
         (["evaluate", cartpole_file, "--gravity", "2"], "gravity belongs to Pendulum-v1"),
         (
             ["train", "--init", cartpole_file],
-            "records the activation relu, not tanh, for CartPole-v1",
+            "records the activation relu, not tanh, for CartPole-v1: give it with --activation",
         ),
     ):
         done = in_process(*words)
@@ -297,12 +297,16 @@ WRONG = [
     (["train", "--update-after", "reset"], "the setting update_after is now train_frequency"),
     (
         ["train", "--hidden-units", "8,,8"],
-        "hidden_units is '8,,8'; expected a list of whole numbers",
+        "hidden_units is '8,,8'; expected whole numbers with commas, such as 64,64",
     ),
     (["train", "--batch-size", "999999999"], "batch_size is 999999999"),
     (["train", "--colour", "red"], "unrecognized arguments: --colour red"),
     (["train", "--resume", "--overwrite"], "not allowed with"),
-    (["train", "--resume"], "no such file"),
+    (
+        ["train", "--resume"],
+        "reference-seed0 holds no run to continue (no pendulum_weight.h5 or cartpole_weight.h5): "
+        "leave out --resume to start a run, or name the folder of one with --out",
+    ),
     (["train", "--out", ""], "the name is empty"),
     (["train", "--preset", ""], "the name is empty"),
     (["train", "--init", "n" * 300], "File name too long"),
@@ -310,7 +314,10 @@ WRONG = [
     (["train", "--init", "missing.h5"], "missing.h5: no such file"),
     (["train", "--init", "text.h5"], "text.h5: not an HDF5 file"),
     (["train", "--init", RECORDED, "--hidden-units", "8"], "hidden_units (512, 256, 128)"),
-    (["train", "--preset", "cartpole-original", "--init", RECORDED], "has environment Pendulum-v1"),
+    (
+        ["train", "--preset", "cartpole-original", "--init", RECORDED],
+        "has environment Pendulum-v1",
+    ),
     (["train", "--preset", "cartpole-original", "--gravity", "1"], "gravity 1.0 belongs to"),
     (["train", "--environment", "CartPole-v1"], "take the preset cartpole (--preset cartpole)"),
     (["train", "--out", "text.h5"], "cannot make the folder text.h5"),
@@ -321,6 +328,7 @@ WRONG = [
     (["evaluate", "n" * 300], "File name too long"),
     (["evaluate", "reference", "--gif", "text.h5"], "text.h5 holds something else than a GIF"),
     (["evaluate", "reference", "--gif", "n" * 300], "File name too long"),
+    (["evaluate", "reference", "--gif", "film.mp4"], "expected a name that ends in .gif"),
     (["evaluate", "reference", "--video", "film.avi"], "expected a name that ends in .mp4"),
     (["evaluate", "reference", "--start", "hanging"], "--start is the start of a film"),
     (["evaluate", "reference", "--gif", "a.gif", "--start", "down"], "'down' is no start"),

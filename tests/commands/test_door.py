@@ -106,6 +106,10 @@ def without_seconds(lines: list[str]) -> list[str]:
         (["\x1b[31m\n"], r"unknown command '\x1b[31m\n'"),
         (["--verison"], "unrecognized arguments: --verison; did you mean --version?"),
         (["train", "--sed", "1"], "unrecognized arguments: --sed 1; did you mean --seed?"),
+        (["train", "--episode", "4"], "arguments: --episode 4; did you mean --episodes?"),
+        (["train", "cartpole"], "arguments: cartpole; did you mean --preset cartpole?"),
+        (["train", "nothing"], "unrecognized arguments: nothing\n"),
+        (["help"], "study; did you mean --help?"),
     ],
 )
 def test_mistyped_command_is_one_error_line_with_the_similar_one(

@@ -143,7 +143,7 @@ def test_unknown_setting_is_refused() -> None:
         ("discount", "none", "a number"),
         ("episodes", "none", "a whole number"),
         ("episodes", "1.5", "a whole number"),
-        ("hidden_units", "8;4", "a list of whole numbers"),
+        ("hidden_units", "8;4", "whole numbers with commas, such as 64,64"),
         ("double_q", "1", "true or false"),
     ],
 )

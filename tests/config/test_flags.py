@@ -103,7 +103,11 @@ def test_every_setting_of_every_preset_can_be_typed(name: str) -> None:
         ("discount", "none", "error: discount is 'none'; expected a number"),
         ("episodes", "none", "error: episodes is 'none'; expected a whole number"),
         ("double_q", "True", "error: double_q is 'True'; expected true or false"),
-        ("hidden_units", "8;4", "error: hidden_units is '8;4'; expected a list of whole numbers"),
+        (
+            "hidden_units",
+            "8;4",
+            "error: hidden_units is '8;4'; expected whole numbers with commas, such as 64,64",
+        ),
     ],
 )
 def test_text_of_another_kind_is_refused_in_one_line(

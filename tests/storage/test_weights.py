@@ -253,7 +253,7 @@ def make_too_wide(file: h5py.File) -> None:
 KERNEL = np.zeros((16, 8), np.float32)
 BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "missing": (lambda path: None, "no such file"),
-    "folder": (lambda path: path.mkdir(), "not a file"),
+    "folder": (lambda path: path.mkdir(), "a folder"),
     "empty": (lambda path: path.write_bytes(b""), "the file is empty"),
     "text": (lambda path: path.write_text("plain text"), "not an HDF5 file"),
     "html": (lambda path: path.write_text("<!DOCTYPE html><html>404"), "not an HDF5 file"),

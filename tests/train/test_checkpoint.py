@@ -419,3 +419,13 @@ def test_checkpoint_of_the_same_versions_is_resumed_without_warning(tmp_path: Pa
     config = kp.preset("original", episodes=2, hidden_units=(8,))
     kp.train_dqn(config, tmp_path)
     load_checkpoint(tmp_path / "pendulum_weight.h5", config)
+
+
+def test_resume_of_a_folder_without_a_run_says_what_is_missing(tmp_path: Path) -> None:
+    config = kp.preset("cartpole", hidden_units=(8,), episodes=1)
+    with pytest.raises(kp.UserError, match=r"\(no pendulum_weight\.h5 or cartpole_weight\.h5\)"):
+        kp.train_dqn(config, tmp_path / "missing", resume=True)
+    assert not (tmp_path / "missing").exists()
+    kp.save_weights(kp.DQN((8,)), tmp_path / "pendulum_weight.h5")  # of another environment
+    with pytest.raises(kp.UserError, match=r"\(no cartpole_weight\.h5\): leave out --resume"):
+        kp.train_dqn(config, tmp_path, resume=True)

@@ -12,6 +12,7 @@ import pytest
 from conftest import Command
 
 import keras_pendulum as kp
+from keras_pendulum.cli import shell_word
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.train import evaluations
 from keras_pendulum.train.closing_lines import closing_lines
@@ -54,21 +55,26 @@ NO_UPDATE = [
     (
         kp.preset("reference", episodes=40, warmup_episodes=41),
         record(39, 0),
-        "the first one comes after episode 41, and the run has the episodes 0 to 39. Continue it "
-        "with more episodes (--resume --episodes N), or start another one with a smaller "
-        "--warmup-episodes (now 41)",
+        "the first one comes after 42 episodes, and the run has 40. Continue it with --resume "
+        "--episodes 500, or start another one with a smaller --warmup-episodes (now 41)",
+    ),
+    (
+        kp.preset("reference", warmup_episodes=700),
+        record(499, 0),
+        "the first one comes after 701 episodes, and the run has 500. Continue it with --resume "
+        "--episodes 1400, or start another one with a smaller --warmup-episodes (now 700)",
     ),
     (
         kp.preset("cartpole-original", episodes=3),
         record(2, 0, environment_steps=70),
-        "its 70 transitions are fewer than one batch. Continue it with more episodes "
-        "(--resume --episodes N), or start another one with a smaller --batch-size (now 128)",
+        "its 70 transitions are fewer than one batch. Continue it with --resume --episodes 600, "
+        "or start another one with a smaller --batch-size (now 128)",
     ),
     (
         kp.preset("cartpole", episodes=3, warmup_episodes=1),
         record(2, 0, environment_steps=70),
-        "its 70 transitions are fewer than one batch. Continue it with more episodes "
-        "(--resume --episodes N), or start another one with a smaller --batch-size (now 128)",
+        "its 70 transitions are fewer than one batch. Continue it with --resume --episodes 800, "
+        "or start another one with a smaller --batch-size (now 128)",
     ),
 ]
 
@@ -77,6 +83,7 @@ NO_UPDATE = [
 def test_run_without_updates_says_why(
     config: kp.Config, last: EpisodeRecord, reason: str, tmp_path: Path
 ) -> None:
+    reason = reason.replace("--resume", f"--resume --out {shell_word(tmp_path)}")
     for mean_return in (-2000.0, 0.0):  # also where the policy is not worse than random actions
         assert warnings(config, last, mean_return, tmp_path) == [
             f"The policy has learned nothing, because the run made no update: {reason}"
@@ -104,6 +111,11 @@ WORSE = [
         f"{kp.preset('cartpole').episodes}",
     ),
     (
+        kp.preset("swingup", episodes=60),  # fewer updates an episode than reference, but shorter
+        record(59, 570),
+        "It had 60 episodes; the preset swingup has 1700: continue with --resume --episodes 1700",
+    ),
+    (
         kp.preset("reference", learning_rate_schedule="constant"),
         record(kp.Config.episodes - 1, 13770),
         "With a constant learning rate, the policy of the last episode may be a bad one: try "
@@ -126,6 +138,7 @@ WORSE = [
 def test_policy_worse_than_random_actions_says_why(
     config: kp.Config, last: EpisodeRecord, reason: str, tmp_path: Path
 ) -> None:
+    reason = reason.replace("--resume", f"--resume --out {shell_word(tmp_path)}")
     bad, good = (-1500.0, -40.0) if config.gravity is not None else (9.4, 300.0)
     assert warnings(config, last, bad, tmp_path) == [
         f"The policy is worse than random actions. {reason}"
@@ -181,9 +194,12 @@ def test_finished_run_that_is_resumed_says_how_to_extend_it(
     assert lines[0] == (
         "Nothing is left to train: this run has all of its 3 episodes (600 steps, 0 updates)."
     )
+    assert 'Continue it with --resume --out "my run" --episodes 500, or' in again.stdout
     assert (tmp_path / "my run" / "history.csv").read_bytes() == before
     (extend,) = (line for line in lines if line.startswith("Extend it: "))
-    extended = in_process("train", *shlex.split(extend)[5:])
+    assert extend.endswith(" --episodes 500")  # those of the preset
+    assert again.stdout.count("--episodes 500") == 2
+    extended = in_process("train", *shlex.split(extend)[5:-1], "6")
     assert extended.returncode == 0, extended.stderr
     assert extended.stdout.startswith("Episode: 3, ")
     assert "Trained 6 episodes" in extended.stdout
