@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def add_film_flags(parser: argparse.ArgumentParser) -> None:
     """Adds --gif, --video and --start."""
     parser.add_argument(
-        "--gif", type=nonempty_path, metavar="FILE", help="save a film of the first episode"
+        "--gif", type=nonempty_path, metavar="FILE.gif", help="save a film of the first episode"
     )
     parser.add_argument(
         "--video",
@@ -39,14 +39,14 @@ def add_film_flags(parser: argparse.ArgumentParser) -> None:
 def require_film_files(arguments: argparse.Namespace) -> None:
     """Raises UserError where the films cannot be made. It is quick, and imports no TensorFlow."""
     if arguments.start is not None and not (arguments.gif or arguments.video):
-        raise UserError("--start is the start of a film: add --gif FILE or --video FILE.mp4")
+        raise UserError("--start is the start of a film: add --gif FILE.gif or --video FILE.mp4")
     if arguments.gif:
         require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
+        _require_ending("--gif", arguments.gif, ".gif")
     if arguments.video:
         from keras_pendulum.evaluate.film import find_ffmpeg
 
-        if not arguments.video.lower().endswith(".mp4"):
-            raise UserError(f"--video is {arguments.video}: expected a name that ends in .mp4")
+        _require_ending("--video", arguments.video, ".mp4")
         require_no_other_file(Path(arguments.video), b"ftyp", "an MP4", offset=4)
         find_ffmpeg()
 
@@ -87,6 +87,11 @@ def make_films(
         write_atomically(arguments.gif, encode_gif(shown_in_gif(pictures, seconds)))
     if arguments.video:
         write_atomically(arguments.video, encode_mp4(find_ffmpeg(), pictures, seconds))
+
+
+def _require_ending(flag: str, name: str, ending: str) -> None:
+    if not name.lower().endswith(ending):
+        raise UserError(f"{flag} is {name}: expected a name that ends in {ending}")
 
 
 def _start(text: str) -> float:

@@ -321,6 +321,7 @@ WRONG = [
     (["evaluate", "n" * 300], "File name too long"),
     (["evaluate", "reference", "--gif", "text.h5"], "text.h5 holds something else than a GIF"),
     (["evaluate", "reference", "--gif", "n" * 300], "File name too long"),
+    (["evaluate", "reference", "--gif", "film.mp4"], "expected a name that ends in .gif"),
     (["evaluate", "reference", "--video", "film.avi"], "expected a name that ends in .mp4"),
     (["evaluate", "reference", "--start", "hanging"], "--start is the start of a film"),
     (["evaluate", "reference", "--gif", "a.gif", "--start", "down"], "'down' is no start"),
