@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 def add_film_flags(parser: argparse.ArgumentParser) -> None:
     """Adds --gif, --video and --start."""
     parser.add_argument(
-        "--gif",
-        type=nonempty_path,
-        metavar="FILE.gif",
-        help="save a film of the first episode",
+        "--gif", type=nonempty_path, metavar="FILE.gif", help="save a film of the first episode"
     )
     parser.add_argument(
         "--video",
@@ -42,7 +39,7 @@ def add_film_flags(parser: argparse.ArgumentParser) -> None:
 def require_film_files(arguments: argparse.Namespace) -> None:
     """Raises UserError where the films cannot be made. It is quick, and imports no TensorFlow."""
     if arguments.start is not None and not (arguments.gif or arguments.video):
-        raise UserError("--start is the start of a film: add --gif FILE or --video FILE.mp4")
+        raise UserError("--start is the start of a film: add --gif FILE.gif or --video FILE.mp4")
     if arguments.gif:
         require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
         require_ending("--gif", arguments.gif, ".gif")

@@ -72,8 +72,10 @@ def _draw_step(draw: Any, top: int, moment: Moment) -> None:
 
 
 def _draw_torque(draw: Any, top: int, torque: float) -> None:
-    """Draws the torque as a number and as a bar, to the right for counterclockwise."""
-    middle, half = 236, 72
+    """Draws the torque as a bar, to the right for counterclockwise, between arrows that say so."""
+    middle, half = 236, 56
+    for side, arrow in ((-1, "↻"), (1, "↺")):
+        draw.text((middle + side * (half + 9), top + 4), arrow, _INK, _font(15), anchor="mm")
     length = round(half * min(1.0, abs(torque) / MAX_TORQUE))
     left, right = (middle - length, middle) if torque < 0 else (middle, middle + length)
     draw.rectangle((left, top, right, top + 8), torque_color(torque))
@@ -83,13 +85,16 @@ def _draw_torque(draw: Any, top: int, torque: float) -> None:
 
 def _draw_returns(draw: Any, top: int, moment: Moment) -> None:
     """Draws the numbers in columns that stay in their places."""
-    columns = {"return": f"{moment.total:.1f}", "best possible": f"{moment.optimum:.1f}"}
+    columns = {"return": f"{moment.total:z.1f}", "best possible": f"{moment.optimum:z.1f}"}
     if moment.torque is not None:
-        columns = {"torque": f"{moment.torque:+.1f} N·m", **columns}
+        torque = f"{moment.torque:+.1f}" if abs(moment.torque) >= 0.05 else "0.0"
+        columns = {"torque": f"{torque} N·m", **columns}
     for i, (name, number) in enumerate(columns.items()):
         right = WIDTH - _MARGIN - 104 * (len(columns) - 1 - i)
         draw.text((right, top), name, _PALE, _font(12), anchor="ra")
-        draw.text((right, top + 17), number, _INK, _font(15, bold=True), anchor="ra")
+        draw.text(
+            (right, top + 17), number.replace("-", "−"), _INK, _font(15, bold=True), anchor="ra"
+        )
 
 
 @cache

@@ -96,19 +96,26 @@ def draw_pendulum(angle: float, torque: float, size: tuple[int, int]) -> pygame.
 def _draw_arrow(
     picture: pygame.Surface, middle: pygame.Vector2, radius: float, torque: float
 ) -> None:
-    """Draws an arc from below the pivot, as long as the torque is large."""
+    """Draws an arc from below the pivot, as long as the torque is large.
+
+    Its white border separates it from the rod, which is as dark.
+    """
     color, direction = rgb(torque_color(torque)), math.copysign(1, torque)
     sweep = 0.75 * math.pi * abs(torque) / MAX_TORQUE
     points = []
     for i in range(121):
         around = -direction * sweep / 2 + direction * sweep * i / 120  # from below
         points.append(middle + radius * pygame.Vector2(math.sin(around), math.cos(around)))
-    for point in points:
-        pygame.draw.circle(picture, color, point, radius / 16)
     outward = (points[-1] - middle) / radius
     ahead = pygame.Vector2(outward.y, -outward.x) * direction
     tip, base = points[-1] + 0.32 * radius * ahead, points[-1]
     corners = [tip, base + 0.17 * radius * outward, base - 0.17 * radius * outward]
+    border = 0.05 * radius
+    for one, other in itertools.pairwise([*corners, corners[0]]):
+        pygame.draw.line(picture, WHITE, one, other, round(2 * border))
+    for shade, extra in ((WHITE, border), (color, 0.0)):
+        for point in points:
+            pygame.draw.circle(picture, shade, point, radius / 16 + extra)
     pygame.draw.polygon(picture, color, corners)
 
 

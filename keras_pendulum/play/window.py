@@ -129,9 +129,9 @@ class Window:
         numbers = {
             "torque": f"{view.torque:+.1f} N·m" if view.torque else "0 N·m",
             "step": f"{view.step} of {STEPS_PER_EPISODE}",
-            "reward": f"{view.reward:.3f}",
-            "return": f"{view.total_reward:.1f}",
-            "best possible": f"{view.optimal_return:.1f}",
+            "reward": f"{view.reward:z.3f}",
+            "return": f"{view.total_reward:z.1f}",
+            "best possible": f"{view.optimal_return:z.1f}",
         }
         width = _WIDTH / len(numbers)
         for i, (name, text) in enumerate(numbers.items()):

@@ -67,7 +67,8 @@ def draw_curve(
     axes.plot(mean, marker=marker, color=CURVE, linewidth=2, label=name)
     for name, height in lines.items():
         color, style, width = _LEVELS.get(name, _OTHER_LEVEL)
-        name = f"{name}: {height:.3g}"
+        number = f"{height:#.3g}".rstrip(".").replace("-", "−")
+        name = f"{name}: {number}"
         axes.axhline(height, color=color, linestyle=style, linewidth=width, label=name)
     axes.autoscale(axis="y")  # without it, a line can coincide with the frame
     axes.set_ylabel(label)

@@ -27,6 +27,7 @@ _ROW = 2.4  # height of a panel
 _BETWEEN = 0.95  # two rows: the names and numbers of an axis, and the title of the next one
 _LEGEND = 0.5  # two lines, above the first row
 _TITLE = 0.8
+_SMALLEST_DECIMAL = 1e-4  # of the numbers at an axis
 
 
 def draw_run(
@@ -99,7 +100,8 @@ def draw_title(figure: Figure, title: str) -> None:
 
 def draw_epsilon(axes: Axes, history: Sequence[EpisodeRecord]) -> None:
     """Draws the share of random actions."""
-    axes.plot([record.epsilon for record in history], color=CURVE, linewidth=2)
+    marker = "o" if len(history) == 1 else ""  # a line needs two episodes
+    axes.plot([record.epsilon for record in history], marker=marker, color=CURVE, linewidth=2)
     axes.set(ylabel="Random actions (ε)", ylim=(-0.02, 1.02))
     draw_episode_axis(axes, len(history))
     axes.yaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")
@@ -145,13 +147,17 @@ def _draw_loss(axes: Axes, history: Sequence[EpisodeRecord]) -> None:
 
 
 def _label_few_numbers(axes: Axes) -> None:
-    """Labels whole powers of ten, or where there are none, other short numbers."""
+    """Labels whole powers of ten, or where there are none, other short numbers.
+
+    Below 0.0001 all labels are powers: a decimal would have too many zeros.
+    """
     from matplotlib.ticker import LogLocator, NullFormatter
 
     low, high = axes.get_ylim()
     subs = (1.0,) if high > 100 * low else (1.0, 2.0, 5.0)
     axes.yaxis.set_major_locator(LogLocator(subs=subs, numticks=6))
-    axes.yaxis.set_major_formatter("{x:g}")
+    if low >= _SMALLEST_DECIMAL:
+        axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
@@ -178,7 +184,10 @@ def _draw_planes(figure: Figure, place: SubplotSpec, planes: Mapping[str, PhaseP
 
     rows: dict[str, tuple[str, Any]] = {
         "torque": ("Greedy torque (N·m)", LinearSegmentedColormap.from_list("torque", SCALE)),
-        "value": ("Discounted return", "viridis"),  # lighter and lighter, also without colour
+        "value": (
+            "Discounted return (max Q)",
+            "viridis",
+        ),  # lighter and lighter, also without colour
     }
     grid = place.subgridspec(2, len(planes), wspace=0.34, hspace=_BETWEEN / _ROW)
     for row, (attribute, (label, colors)) in enumerate(rows.items()):

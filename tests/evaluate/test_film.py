@@ -126,12 +126,26 @@ def test_texts_of_a_frame_do_not_overlap_and_are_inside(
     titles = ("pendulum_weight, g = 100 m/s²", "start of seed 4294967295")
     moment = Moment(titles, step=200, steps=200, torque=torque, total=-3255.1, optimum=-1758.3)
     picture = draw_frame(SCENE, moment)
-    assert len(boxes) == (9 if torque is not None else 7)
+    assert len(boxes) == (11 if torque is not None else 7)
     for i, (left, top, right, bottom) in enumerate(boxes):
         assert left >= 0 and top >= 0 and right <= picture.width and bottom <= picture.height
         for other in boxes[:i]:
             apart = right <= other[0] or left >= other[2] or bottom <= other[1] or top >= other[3]
             assert apart, (boxes[i], other)
+
+
+def test_numbers_of_a_frame_have_no_negative_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    from PIL import ImageDraw
+
+    texts: list[str] = []
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", lambda *words, **_: texts.append(words[2]))
+    for torque in (-0.01, 0.01):
+        draw_frame(SCENE, Moment(TITLES, 1, 200, torque=torque, total=-0.04, optimum=-0.001))
+        assert texts.count("0.0 N·m") == 1
+        assert texts.count("0.0") == 2
+        texts.clear()
+    draw_frame(SCENE, Moment(TITLES, 1, 200, torque=-2.0, total=-9.96, optimum=0.0))
+    assert {"−2.0 N·m", "−10.0"} <= set(texts)
 
 
 def test_gif_loops_with_the_pictures() -> None:

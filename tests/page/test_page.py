@@ -14,6 +14,7 @@ from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
 from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.version import __version__
 
 
@@ -48,6 +49,39 @@ def test_two_networks_run_in_step_from_one_start(duel: str, player: Player) -> N
     assert optimum == pytest.approx(best, abs=0.02)
     wide = player.run("return [0, 1].map(i => document.getElementById(`name-${i}`).offsetParent)")
     assert None not in wide
+
+
+def test_names_lines_and_q_values_belong_to_their_network(duel: str, player: Player) -> None:
+    player.open(duel)
+    player.press(Keys.SPACE)
+    assert player.text("values-title") == "Q-values of reference"
+    styles = player.run(
+        "return [...document.querySelectorAll('.stroke')]"
+        ".map(e => getComputedStyle(e).borderTopStyle)"
+    )
+    assert styles == ["solid", "dashed"]  # as the paths on the phase portrait
+    player.set_screen(667, 375)
+    player.run("pendulum.page.other.return = -1234.56; pendulum.page.changed = true")
+    player.wait(lambda: player.text("return-1") == "−1234.6")
+    tops = player.run(
+        "return ['pendulum', 'pendulum-1'].map("
+        "  id => document.getElementById(id).getBoundingClientRect().top)"
+    )
+    assert tops[0] == tops[1]  # the pendulums are side by side, however many lines a name has
+
+
+def test_another_gravity_than_in_training_is_said_above_the_pendulum(
+    player: Player, tmp_path: Path
+) -> None:
+    out = tmp_path / "page.html"
+    for words, title in (
+        (["reference", "--gravity", "5"], "Pendulum at g = 5 m/s², trained at 1"),
+        (["reference", "--gravity", "1"], "Pendulum"),
+        (["reference", "--against", "swingup"], "Pendulum at g = 1 m/s², swingup trained at 10"),
+    ):
+        assert page_command.main([*words, "--out", str(out)]) == 0
+        player.open(out.as_uri())
+        assert player.text("swing-title") == title
 
 
 def test_page_sends_no_network_requests(pages: dict[str, str], player: Player) -> None:

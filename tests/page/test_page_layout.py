@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -50,6 +51,44 @@ def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player:
     player.wait(lambda: set(player.run(widths)) == {2})  # as sharp as the screen
     dark = player.run("return getComputedStyle(document.body).backgroundColor") == "rgb(15, 19, 25)"
     assert dark == (theme == "dark")
+
+
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [(1280, 657), (1216, 700), (1024, 768), (844, 390), (667, 375), (390, 844), (320, 568)],
+)
+def test_widest_readings_do_not_touch(width: int, height: int, duel: str, player: Player) -> None:
+    player.set_screen(width, height)
+    player.open(duel)
+    player.press(Keys.SPACE)
+    # Each new part of the map would write the readings anew.
+    player.run("pendulum.page.map.work(60000); pendulum.page.changeMap()")
+    player.wait(lambda: not player.run("return pendulum.page.changed"))
+    widest = {"torque": "−2.0", "reward": "−16.27", "return": "−1848.8", "step": "200/200"}
+    widest |= {"theta": "−3.14", "thetadot": "−8.00", "optimum": "−1234.5"}
+    for id, text in widest.items():
+        player.run("element(arguments[0]).textContent = arguments[1]", id, text)
+    boxes = player.run(
+        "return [...document.querySelectorAll('dt, dd')].map(e => {"
+        "  const range = document.createRange();"
+        "  range.selectNodeContents(e);"
+        "  const { left, right, top } = range.getBoundingClientRect();"
+        "  return [Math.round(top), left, right, e.textContent]"
+        "})"
+    )
+    assert len(boxes) == 14
+    for (top, _, right, text), (next_top, left, _, next_text) in pairwise(sorted(boxes)):
+        assert top != next_top or left - right >= 8, (text, next_text)
+
+
+def test_keys_of_buttons_are_in_one_line(pages: dict[str, str], player: Player) -> None:
+    for width in (960, 1024, 1152, 1280, 1600):
+        player.set_screen(width, 700)
+        player.open(pages["reference"])
+        heights = player.run(
+            "return [...document.querySelectorAll('.row button')].map(e => e.clientHeight)"
+        )
+        assert max(heights) < 40, width
 
 
 @pytest.mark.parametrize("page", ["one", "two"])

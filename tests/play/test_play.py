@@ -280,6 +280,18 @@ def test_pendulum_is_drawn_counterclockwise_from_upright(angle: float, side: str
     assert (rod[:250].sum() > 3 * rod[250:].sum()) == (side == "left")
 
 
+def test_arrow_of_the_torque_has_a_white_border_on_the_rod() -> None:
+    pixels = pygame.surfarray.array3d(draw_pendulum(np.pi, 2.0, (500, 456))).astype(int)
+    below = pixels[250, 228 + 20 :]  # from the pivot down, along the hanging rod
+    colors = {"rod": drawing._ROD, "arrow": rgb(COUNTERCLOCKWISE), "border": drawing.WHITE}
+    crossed: list[str] = []
+    for pixel in below[:150]:
+        for name, color in colors.items():  # the pixel between two colors has neither
+            if abs(pixel - color).sum() < 20 and crossed[-1:] != [name]:
+                crossed.append(name)
+    assert crossed == ["rod", "border", "arrow", "border", "rod"]
+
+
 def test_window_says_that_it_loads_before_the_policy_is_loaded(
     no_window: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:

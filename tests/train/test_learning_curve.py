@@ -44,8 +44,11 @@ def test_curve_begins_at_the_first_episode() -> None:
 
 def test_legend_has_the_number_of_each_line() -> None:
     axes = Figure().subplots()
-    draw_curve(axes, [-1.0], "Return", mean_over=10, lines={"best possible": -0.2034})
-    assert axes.get_legend_handles_labels()[1][-1] == "best possible: -0.203"
+    lines = {"best possible": -0.2034, "γ": -0.41, "random": -4.412, "steps": 500.0}
+    draw_curve(axes, [-1.0], "Return", mean_over=10, lines=lines)
+    names = axes.get_legend_handles_labels()[1][-4:]
+    # As many digits for each number, and the minus of the axis.
+    assert names == ["best possible: −0.203", "γ: −0.410", "random: −4.41", "steps: 500"]
 
 
 def test_trailing_mean_has_fewer_values_at_the_start() -> None:

@@ -71,6 +71,32 @@ def test_torques_have_the_colours_of_the_other_pictures(planes: dict[str, PhaseP
         assert image.to_rgba(np.array([torque]))[0] == pytest.approx(to_rgba(color), abs=0.01)
 
 
+def test_epsilon_is_visible_from_the_first_episode_on() -> None:
+    for episodes, marker in ((1, "o"), (2, "")):
+        axes = Figure().subplots()
+        run_figure.draw_epsilon(axes, make_history(episodes))
+        assert axes.get_lines()[0].get_marker() == marker
+
+
+@pytest.mark.parametrize(
+    ("losses", "labels"),
+    [
+        ((0.3, 2e-6), {r"$\mathdefault{10^{-5}}$", r"$\mathdefault{10^{-1}}$"}),
+        ((0.3, 2e-3), {"0.01", "0.1"}),
+    ],
+)
+def test_labels_of_the_loss_have_one_form(losses: tuple[float, ...], labels: set[str]) -> None:
+    history = [
+        EpisodeRecord(i, -1.0, -200.0, 0.5, loss, 200, i, 0.1) for i, loss in enumerate(losses)
+    ]
+    axes = Figure().subplots()
+    run_figure._draw_loss(axes, history)
+    shown = {label.get_text() for label in axes.get_yticklabels()}
+    assert labels <= shown
+    assert not any("e-" in text for text in shown)
+    assert len({text.startswith("$") for text in shown}) == 1
+
+
 def test_picture_is_a_png() -> None:
     png = run_figure.draw_run(make_history(2), "Pendulum-v1", LEVELS, {})
     assert matplotlib.image.imread(io.BytesIO(png)).shape[1] == 960

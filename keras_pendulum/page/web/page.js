@@ -114,6 +114,7 @@ class Page {
     document.querySelector("figcaption").hidden = false;
     names.forEach((name, i) => {
       if (i) element(`name-${i}`).textContent = name;
+      else element("values-title").textContent = `Q-values of ${name}`;
       const button = document.querySelector(`[data-layer="${i}"]`);
       button.hidden = false;
       button.textContent = name;

@@ -11,6 +11,7 @@ try {
     ...records.map(about),
     `Written by keras_pendulum ${recorded.version}.`,
   ].join(" ");
+  element("elsewhere").textContent = elsewhereText(records, networkNames(recorded));
   document.title = `Inverted pendulum: ${recorded.name}`;
   const page = new Page(recorded, networks, optimum, training);
   /** Access to the page from the console and from tests. */

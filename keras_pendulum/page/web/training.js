@@ -86,7 +86,7 @@ class Training {
     slider.value = this.shown;
     slider.setAttribute("aria-valuetext", `episode ${here} of ${end}`);
     const reward = curveValue(this.curve, here / end);
-    element("training-text").textContent = `episode ${here} of ${end}: reward a step ${shown(reward, 2)}`;
+    element("training-text").textContent = `episode ${here} of ${end}: reward per step ${shown(reward, 2)}`;
     element("play-training").firstElementChild.textContent = this.playing ? "Stop" : "Play training";
     this.changed = true;
   }

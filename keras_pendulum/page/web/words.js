@@ -7,6 +7,20 @@ function networkNames(recorded) {
   return names[0] === names[1] ? names.map((name, i) => `${name} (${i + 1})`) : names;
 }
 
+/** Returns whether a network was trained at another gravity than that of the page. */
+function isElsewhere({ gravity, trainedGravity }) {
+  return trainedGravity !== null && trainedGravity !== gravity;
+}
+
+/** Returns a warning behind the title where a network was trained at another gravity, else "". */
+function elsewhereText(records, names) {
+  const texts = records.flatMap((each, i) => {
+    if (!isElsewhere(each)) return [];
+    return `${records.length > 1 ? `${names[i]} ` : ""}trained at ${each.trainedGravity}`;
+  });
+  return texts.length ? [` at g = ${records[0].gravity} m/s²`, ...texts].join(", ") : "";
+}
+
 /** Returns the text on a network. */
 function about({ name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn }) {
   const from = preset && !name.startsWith(`${preset}.`) ? ` (preset ${preset})` : "";
@@ -14,7 +28,7 @@ function about({ name, preset, sizes, activation, gravity, trainedGravity, evalu
     `${name}${from}, a ${sizes.slice(1, -1).join("-")} ${activation} network with ` +
       `${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
   ];
-  const elsewhere = trainedGravity !== null && trainedGravity !== gravity;
+  const elsewhere = isElsewhere({ gravity, trainedGravity });
   if (elsewhere) {
     sentences.push(`Another gravity than in training: it was trained at g = ${trainedGravity} m/s².`);
   }
