@@ -129,7 +129,7 @@ def dqn_files() -> str:
         {"file": f"`{name}`", "what it is": _title(text), "lines": len(text.splitlines())}
         for name, text in texts.items()
     ]
-    total = sum(int(row["lines"]) for row in rows)
+    total = sum(len(text.splitlines()) for text in texts.values())
     return f"**Only the DQN** is {total} lines, in reading order:\n\n{markdown(rows)}"
 
 

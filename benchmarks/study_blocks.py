@@ -56,18 +56,19 @@ def study_table() -> str:
 
 
 def study_arm(name: str) -> str:
-    """Returns the regret of an arm with its interval; `name` may be the beginning of its name."""
-    arms = {arm["arm"]: arm for arm in study()["rows"]}
-    arm = arms.get(name) or next(arms[other] for other in arms if other.startswith(name))
+    """Returns the regret of an arm with its interval."""
+    arm = next(arm for arm in study()["rows"] if arm["arm"] == name)
     low, high = number(arm["regret_low"]), number(arm["regret_high"])
     return f"{number(arm['regret_iqm'])} ({low} to {high})"
 
 
 def exercise_updates() -> str:
     """Returns the expected regrets of the first exercise."""
+    change = next(arm["arm"] for arm in study()["rows"] if arm["arm"].startswith("+ updates"))
     return (
-        f"Expected: {study_arm('original')} without the change, {study_arm('+ updates')} with it, "
-        "as interquartile mean and 95 % interval over the seeds of the study.\n"
+        f"Expected: {study_arm('original')} without the change, {study_arm(change)} with "
+        f"`{change.removeprefix('+ ')}`, as interquartile mean and 95 % interval over the seeds of "
+        "the study.\n"
     )
 
 
