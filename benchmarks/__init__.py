@@ -1,1 +1,1 @@
-"""Benchmarks: each is one command that measures figures of README.md."""
+"""Benchmarks: each is one command that measures figures of README.md and docs."""

@@ -1,4 +1,4 @@
-"""The results of the presets: README.md's first table, and the shipped weights.
+"""The results of the presets, and the shipped weights.
 
     python -m benchmarks.quality [SEEDS]
 
@@ -6,8 +6,8 @@ Trains the presets below with the training seeds 0, 1, … (5 seeds), two runs a
 evaluates each run greedily on the starts of seeds 0 to 99. Then the command
 `keras_pendulum.train`, timed as a whole process with nothing else on the machine, makes the runs
 whose weights are shipped: seed 0 of each preset, but of `original` the repetition of the recorded
-run (seed 1 from its initial weights). Writes the table into README.md and the networks to weights/.
-It takes ten minutes on two cores.
+run (seed 1 from its initial weights). Writes the networks to weights/. It takes ten minutes on two
+cores.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from benchmarks.report import run_process, write
 from keras_pendulum.environments.tasks import TASKS
 
 PRESETS = ("original", "reference", "swingup", "cartpole")
-MARKS = ("<!-- python -m benchmarks.quality -->", "<!-- end of the results -->")
 _ROOT = Path(__file__).parents[1]
 _RECORDED_RUN = _ROOT / "tests" / "data" / "original_run_seed1.npz"
 
@@ -82,11 +81,7 @@ def main(seeds: int = 5) -> None:
             table_row(name, scores[i * seeds : (i + 1) * seeds], ship(name, Path(folder)))
             for i, name in enumerate(PRESETS)
         ]
-    table = write("quality", "python -m benchmarks.quality", rows)
-    readme = _ROOT / "README.md"
-    before, rest = readme.read_text(encoding="utf-8").split(MARKS[0])
-    after = rest.split(MARKS[1])[1]
-    readme.write_text(f"{before}{MARKS[0]}\n{table}{MARKS[1]}{after}", encoding="utf-8")
+    write("quality", "python -m benchmarks.quality", rows)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
     python -m benchmarks.recorded_cartpole
 
-Prints how many episodes and actions are identical. tests/torch/torch_cartpole.py recorded the run,
+Writes how many episodes and actions are identical. tests/torch/torch_cartpole.py recorded the run,
 with the same random draws and with Adam's ε in the same place. It takes ten seconds.
 """
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import keras_pendulum as kp
+from benchmarks.report import write
 from keras_pendulum.dqn.network import Provenance
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import make_run
@@ -61,8 +62,11 @@ def main() -> None:
             break
         identical += 1
         steps += len(expected)
-    print(f"identical episodes, from the first on: {identical} of {len(recorded_actions)}")
-    print(f"identical actions, from the first on: {steps} of {sum(map(len, recorded_actions))}")
+    row = {
+        "identical episodes, from the first on": f"{identical} of {len(recorded_actions)}",
+        "identical actions, from the first on": f"{steps} of {sum(map(len, recorded_actions))}",
+    }
+    write("recorded_cartpole", "python -m benchmarks.recorded_cartpole", [row])
 
 
 if __name__ == "__main__":

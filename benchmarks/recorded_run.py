@@ -2,14 +2,14 @@
 
     python -m benchmarks.recorded_run
 
-Trains from the recorded initial weights. Prints for each run how many episodes have identical
-actions, averages and printed lines, the largest differences of losses and final weights, and the
-duration. It takes ten seconds.
+Trains from the recorded initial weights. Writes for each run how many episodes have identical
+actions, averages and printed lines, the largest difference of a loss in these episodes, and that of
+a final weight where all episodes are identical. It takes ten seconds.
 """
 
 from __future__ import annotations
 
-import time
+import math
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import keras_pendulum as kp
+from benchmarks.report import Row, write
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import Run, make_run
 
@@ -48,8 +49,8 @@ def recorded_torques(recorded: dict[str, NDArray[Any]]) -> NDArray[np.float32]:
     return np.linspace(-2, 2, 41)[recorded["action_index"]].astype(np.float32)
 
 
-def repeat(preset: str) -> None:
-    """Repeats the recorded run of a preset and prints the comparison."""
+def repeat(preset: str) -> Row:
+    """Repeats the recorded run of a preset; returns the comparison."""
     with np.load(_DATA / f"{preset}_run_seed1.npz") as arrays:
         recorded = dict(arrays)
     lines = (_DATA / f"{preset}_run_seed1.log").read_text("utf-8").splitlines()
@@ -58,7 +59,6 @@ def repeat(preset: str) -> None:
     initial = kp.DQN(config.hidden_units)
     initial.set_weights([recorded[f"initial_weight_{i}"] for i in range(8)])
 
-    started = time.perf_counter()
     run = make_run(config, initial)
     torques = record_torques(run)
     identical = 0  # counts up to the first episode with a difference
@@ -70,25 +70,33 @@ def repeat(preset: str) -> None:
             and record.average_reward == recorded["average_reward"][record.episode]
             and np.array_equal(torques[steps], expected_torques[steps])
         )
-    seconds = time.perf_counter() - started
-
-    print(f"{preset}: identical episodes, from the first on: {identical} of {len(lines)}")
+    losses = np.array([record.loss for record in run.history if not np.isnan(record.loss)])
+    same = len(losses) - (len(lines) - identical)  # updates before the first difference
+    loss_difference = weight_difference = math.nan
     if "loss" in recorded:
-        losses = np.array([record.loss for record in run.history if not np.isnan(record.loss)])
-        difference = np.abs(losses / recorded["loss"] - 1).max()
-        print(f"{preset}: largest relative difference of a loss: {difference:.1e}")
-    weights = run.agent.online.get_weights()
-    difference = max(
-        np.abs(actual - recorded[f"final_weight_{i}"]).max() for i, actual in enumerate(weights)
-    )
-    print(f"{preset}: largest difference of a final weight: {difference:.1e}")
-    print(f"{preset}: duration: {seconds:.1f} s")
+        loss_difference = np.abs(losses[:same] / recorded["loss"][:same] - 1).max()
+    if identical == len(lines):
+        weight_difference = max(
+            np.abs(actual - recorded[f"final_weight_{i}"]).max()
+            for i, actual in enumerate(run.agent.online.get_weights())
+        )
+    return {
+        "listing": f"`{preset}`",
+        "identical episodes, from the first on": f"{identical} of {len(lines)}",
+        "identical actions": identical * STEPS,
+        "largest relative difference of a loss until there": _shown(loss_difference),
+        "largest difference of a final weight": _shown(weight_difference),
+    }
+
+
+def _shown(difference: float) -> str:
+    return "–" if math.isnan(difference) else f"{difference:.1e}"
 
 
 def main() -> None:
     """Repeats both recorded runs."""
-    for preset in ("original", "walkthrough"):
-        repeat(preset)
+    rows = [repeat(preset) for preset in ("original", "walkthrough")]
+    write("recorded_run", "python -m benchmarks.recorded_run", rows)
 
 
 if __name__ == "__main__":

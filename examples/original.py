@@ -2,7 +2,8 @@
 
     python examples/original.py [EPISODES]
 
-It prints one line per episode (500, three minutes). It does not learn; README.md explains why.
+It prints one line per episode (500, three minutes). It does not learn;
+docs/why_the_original_does_not_learn.md explains why.
 
 Network, replay buffer, training loop and update are those of the final listing. Added are the seeds
 and the initial weights of a recorded run, so that the program prints the lines of that run. Later

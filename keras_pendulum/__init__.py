@@ -79,7 +79,11 @@ def __getattr__(name: str) -> Any:
         if name in names:
             require_tensorflow()
             with fast_import():
-                return getattr(importlib.import_module(f"keras_pendulum.{module}"), name)
+                found = importlib.import_module(f"keras_pendulum.{module}")
+            # The import binds the name of the room, which would hide the function `diagnose`.
+            for each in names:
+                globals()[each] = getattr(found, each)
+            return globals()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

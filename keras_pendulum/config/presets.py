@@ -114,6 +114,9 @@ def preset(name: str = "reference", **changes: Any) -> Config:
 
     Raises ConfigError for an unknown preset or setting, for a value out of range, and for another
     environment without its gravity.
+
+    >>> kp.preset("original", seed=3).updates_per_episode
+    1
     """
     if name not in PRESETS:
         raise ConfigError(

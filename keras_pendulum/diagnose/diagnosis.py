@@ -39,9 +39,9 @@ class Diagnosis:
     """The findings on an agent, the strongest first."""
 
     measurement: Measurement
-    findings: list[Finding]
-    notes: list[Finding]  # what costs little
-    limits: list[str]  # what could not be told
+    findings: list[Finding]  #: the strongest first
+    notes: list[Finding]  #: what costs little
+    limits: list[str]  #: what could not be told
 
     @property
     def verdict(self) -> str:

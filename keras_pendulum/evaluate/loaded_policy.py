@@ -101,5 +101,9 @@ def load_policy(path: str | os.PathLike[str], activation: str | None = None) -> 
     """Returns the greedy policy of a weights file; the arguments are those of `load_weights`.
 
     Raises WeightsError as `load_weights` does.
+
+    >>> policy = kp.load_policy("reference")
+    >>> policy([-1.0, 0.0, 0.0]).shape  # hanging at rest; a torque in N·m
+    (1,)
     """
     return Policy(load_weights(path, activation))

@@ -45,6 +45,10 @@ def q_function(
 
     Raises ConfigError for wrong torques. Raises UserError when the function cannot be called so, or
     returns anything else.
+
+    >>> agent = kp.q_function(lambda observations: observations, torques=[-2, 0, 2])
+    >>> kp.evaluate_policy(agent, episodes=1).regret > 100
+    True
     """
     if not callable(function):
         raise TypeError(f"function is {function!r}; expected a function of observations")

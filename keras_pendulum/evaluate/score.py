@@ -19,12 +19,12 @@ FINER_TORQUE_GAIN = 0.002
 class Score:
     """The undiscounted returns of whole episodes."""
 
-    environment: str
-    gravity: float | None  # m/s²; None for CartPole
-    returns: NDArray[np.float64]  # [episodes]
-    optimal_returns: NDArray[np.float64]  # [episodes]; with 41 torques; 500 for CartPole
-    discount: float | None = None  # γ that the policy learned with, where it is known
-    seeds: range | None = None  # of the starts
+    environment: str  #: Gymnasium's name
+    gravity: float | None  #: m/s²; None for CartPole
+    returns: NDArray[np.float64]  #: [episodes]
+    optimal_returns: NDArray[np.float64]  #: [episodes]; with 41 torques; 500 for CartPole
+    discount: float | None = None  #: γ that the policy learned with, where it is known
+    seeds: range | None = None  #: of the starts
 
     @property
     def mean_return(self) -> float:
@@ -58,7 +58,7 @@ class Score:
 
     @property
     def discount_regret(self) -> float | None:
-        """The part of the regret that the discount alone costs: that of the exact policy for γ.
+        """The part of the regret that the discount alone costs, by the exact policy for γ.
 
         It is None for an unknown discount and for CartPole. For another γ and gravity than those
         of the presets, its first use takes about 10 s.

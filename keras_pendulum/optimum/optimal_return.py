@@ -80,6 +80,9 @@ def optimal_return(
 
     Raises:
         ConfigError: (a ValueError) for a gravity, a seed or steps out of range.
+
+    >>> kp.optimal_return(gravity=1.0, seeds=range(3)).shape
+    (3,)
     """
     gravity = validate_gravity(gravity)
     seeds = [validate_seed(seed) for seed in seeds]

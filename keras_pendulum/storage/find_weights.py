@@ -10,7 +10,7 @@ from keras_pendulum.storage.shipped_weights import shipped_folders, shipped_name
 
 
 def find_weights(name: str | os.PathLike[str]) -> Path:
-    """Returns the path of a weights file: `name` itself, or the shipped file `name`(.h5).
+    """Returns the path of a weights file: `name` itself, or the shipped file `name.h5`.
 
     Raises WeightsError when neither exists.
     """

@@ -33,10 +33,10 @@ Phase = Literal["compiling", "evaluating", "drawing"]
 class TrainingResult:
     """The trained network, and the record of each episode."""
 
-    network: DQN
-    history: list[EpisodeRecord]
-    finished: bool  # false where `should_stop` ended the run before its last episode
-    score: Score | None = None  # greedy, of a finished run with a folder, for the picture's title
+    network: DQN  #: the network after the last update
+    history: list[EpisodeRecord]  #: one record per episode, with the names of history.csv's columns
+    finished: bool  #: false where `should_stop` ended the run before its last episode
+    score: Score | None = None  #: greedy, of a finished run with a folder, for the picture's title
 
 
 def train_dqn(

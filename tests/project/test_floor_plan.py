@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -141,3 +143,9 @@ def test_wrong_import_is_reported_with_its_file(
     with (tmp_path / file).open("a", encoding="utf-8") as changed:
         changed.write(f"\n{line}\n")
     assert problem in problems(tmp_path)
+
+
+def test_function_is_not_hidden_by_the_room_of_its_name() -> None:
+    # In a process of its own, because the import of a room binds its name only once.
+    code = "import keras_pendulum as kp; kp.Diagnosis; kp.diagnose; assert callable(kp.diagnose)"
+    subprocess.run([sys.executable, "-c", code], check=True)

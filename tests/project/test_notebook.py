@@ -1,30 +1,34 @@
-"""Tests of examples/tour.ipynb: all its cells run, and they print the results that it describes."""
+"""Tests of examples/tour.ipynb: its cells print what it describes, and it ships with outputs."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
+from pathlib import Path
 from typing import Any
 
 import nbformat
 import pytest
-from conftest import ROOT
-from nbclient import NotebookClient
 
-TOUR = ROOT / "examples" / "tour.ipynb"
+from benchmarks.notebook import TOUR, execute
+
+
+@pytest.fixture(scope="module")
+def stored() -> Any:
+    """Returns the notebook as it ships."""
+    return nbformat.read(TOUR, as_version=4)  # type: ignore[no-untyped-call]
 
 
 @pytest.fixture(scope="module")
 def tour(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Returns the notebook with its outputs, executed in an empty folder."""
-    notebook = nbformat.read(TOUR, as_version=4)  # type: ignore[no-untyped-call]
-    folder = str(tmp_path_factory.mktemp("tour"))
+    notebook: Any = nbformat.read(TOUR, as_version=4)  # type: ignore[no-untyped-call]
     # With this variable, the kernel would not show what C++ code prints.
     environment = {
         name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"
     }
-    client = NotebookClient(notebook, timeout=300, resources={"metadata": {"path": folder}})
-    client.execute(env=environment)
+    execute(notebook, tmp_path_factory.mktemp("tour"), env=environment)
     return notebook
 
 
@@ -32,7 +36,11 @@ def printed(cell: Any) -> str:
     return "".join(output.text for output in cell.outputs if output.output_type == "stream")
 
 
-def test_original_does_not_learn_and_the_other_presets_do(tour: Any) -> None:
+@pytest.mark.parametrize("name", ["tour", "stored"])
+def test_original_does_not_learn_and_the_other_presets_do(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    tour = request.getfixturevalue(name)
     text = "\n".join(printed(cell) for cell in tour.cells if cell.cell_type == "code")
     original, reference, _, cartpole = map(float, re.findall(r"Regret: (.*)", text))
     assert original > 500
@@ -53,11 +61,31 @@ def test_truncated_indices_are_listed(tour: Any) -> None:
 
 
 def test_live_plot_is_one_picture_that_is_redrawn(tour: Any) -> None:
-    (cell,) = (cell for cell in tour.cells if "LivePlot()" in cell.source)
+    (cell,) = (cell for cell in tour.cells if "LivePlot(" in cell.source)
     # The run takes many times as long as the pause between two drawings.
     assert len([output for output in cell.outputs if output.output_type == "display_data"]) == 1
 
 
-def test_notebook_is_stored_without_outputs() -> None:
-    stored = nbformat.read(TOUR, as_version=4)  # type: ignore[no-untyped-call]
-    assert not any(cell.get("outputs") for cell in stored.cells)
+def test_stored_outputs_are_of_the_kinds_that_the_cells_make(tour: Any, stored: Any) -> None:
+    def kinds(notebook: Any) -> list[list[str]]:
+        cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+        return [[output.output_type for output in cell.outputs] for cell in cells]
+
+    assert kinds(stored) == kinds(tour)
+
+
+def test_picture_of_the_run_names_the_optimum_and_random_actions(stored: Any) -> None:
+    (cell,) = (cell for cell in stored.cells if "draw_run(" in cell.source)
+    assert "lines = reference_returns(config)" in cell.source
+    assert cell.outputs[0].data["image/png"]
+
+
+def test_stored_notebook_is_small_and_knows_no_machine() -> None:
+    text = TOUR.read_text(encoding="utf-8")
+    assert len(text) < 600_000
+    without_pictures = re.sub(r'"image/png": "[^"]*"', "", text)
+    assert str(Path.home()) not in without_pictures
+    # Paths, addresses of objects, and times of the execution.
+    assert re.findall(r"/(?:tmp|home|work|usr|root)/|0x[0-9a-f]{6}|\.py:\d", without_pictures) == []
+    cells = json.loads(text)["cells"]
+    assert all(cell["metadata"] == {} for cell in cells)

@@ -22,7 +22,7 @@ import pytest
 from conftest import ROOT
 
 FILES = (
-    *("CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "README.md"),
+    *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "README.md"),
     *("pyproject.toml", "setup.cfg"),
 )
 FOLDERS = ("benchmarks", "docs", "examples", "keras_pendulum", "tests", "weights")
@@ -50,7 +50,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
     for name in FILES:
         shutil.copy(ROOT / name, checkout)
     for name in FOLDERS:
-        ignored = shutil.ignore_patterns("__pycache__")
+        ignored = shutil.ignore_patterns("__pycache__", "_build")
         shutil.copytree(ROOT / name, checkout / name, ignore=ignored)
     succeed([sys.executable, "-c", BUILD], checkout, "the build failed")
     (sdist,) = checkout.glob("dist/*.tar.gz")
@@ -98,6 +98,7 @@ def test_wheel_contains_package_data_and_weights_only(built: Built) -> None:
 
 def test_sdist_contains_sources_tests_and_weights(built: Built) -> None:
     expected = set(FILES).union(*(files_below(ROOT / name, name) for name in FOLDERS))
+    expected = {name for name in expected if not name.startswith("docs/_build/")}
     with tarfile.open(built.sdist) as archive:
         found = {name.partition("/")[2] for name in archive.getnames()}
     assert expected - found == set()

@@ -1,0 +1,133 @@
+"""The blocks of README.md and docs about the presets and their results."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import keras_pendulum as kp
+from benchmarks.choosing import ARMS
+from benchmarks.departures import BEFORE, departures, measured
+from benchmarks.reasons import REASONS
+from benchmarks.report import markdown
+from benchmarks.result_files import printed_by, row_of, rows_of, summary
+from keras_pendulum.__main__ import PRESET_LINES
+from keras_pendulum.config.fields import format_value
+from keras_pendulum.config.presets import PRESETS
+from keras_pendulum.environments.tasks import task_name
+
+
+def score() -> str:
+    """Returns what `evaluate` prints for the shipped policy `reference`."""
+    return fenced(printed_by("evaluate reference"))
+
+
+def story() -> str:
+    """Returns the table of the original, the fixed agent, the optimum and random torques."""
+    original, fixed = (row_of("quality", preset=f"`{name}`") for name in ("original", "reference"))
+    random_return = float(printed_by("train")[0].split(": ")[1])
+    optimum = float(fixed["best possible return"])
+    policies = {
+        "the original program": (original["mean return"], original["mean regret"]),
+        "the same design, fixed": (fixed["mean return"], fixed["mean regret"]),
+        "the exact optimum": (fixed["best possible return"], "0"),
+        "random torques": (f"{random_return:.1f}", f"{optimum - random_return:.1f}"),
+    }
+    return markdown(
+        [
+            {"policy": policy, "mean return": mean_return, "regret": regret}
+            for policy, (mean_return, regret) in policies.items()
+        ]
+    )
+
+
+def first_run() -> str:
+    """Returns the closing lines of the first training."""
+    seconds = row_of("quality", preset="`reference`")["whole command"]
+    # The training evaluates its policy in the same words, and then names random actions.
+    lines = printed_by("evaluate reference") + printed_by("train")
+    return f"Installed, it trains in {seconds} on two cores and ends with:\n\n{fenced(lines)}"
+
+
+def diagnosis() -> str:
+    """Returns the first line of the diagnosis of `original`."""
+    return fenced(printed_by("diagnose original")[:1])
+
+
+def comparison() -> str:
+    """Returns what `compare` printed."""
+    lines = printed_by("compare runs/original-seed0 runs/reference-seed0")
+    return "".join(f"{line}\n" for line in lines if line.startswith("|"))
+
+
+def fenced(lines: list[str]) -> str:
+    """Returns lines as a block of code."""
+    return "\n".join(["```text", *lines, "```"]) + "\n"
+
+
+def presets() -> str:
+    """Returns the list of the presets with their tasks."""
+    return markdown(
+        [
+            {
+                "preset": f"`{name}`",
+                "task": task_name(config.environment, config.gravity),
+                "what it is": PRESET_LINES[name],
+            }
+            for name, config in PRESETS.items()
+        ]
+    )
+
+
+def settings() -> str:
+    """Returns the list of all settings with the values of `reference`."""
+    default = kp.preset()
+    return markdown(
+        [
+            {
+                "setting": f"`{field.name}`",
+                "`reference`": format_value(getattr(default, field.name)),
+                "meaning": field.metadata["help"],
+            }
+            for field in fields(kp.Config)
+        ]
+    )
+
+
+def departure_table(preset: str) -> str:
+    """Returns a preset's departures from the earlier one with reasons and measured regrets."""
+    earlier, later = kp.preset(BEFORE[preset]), kp.preset(preset)
+    regrets = measured(preset)
+    rows = []
+    for name in departures(preset):
+        if name not in REASONS[preset]:
+            raise SystemExit(f"error: benchmarks/reasons.py: {preset} has no reason for {name}")
+        if name not in regrets:
+            raise SystemExit(
+                f"error: benchmarks/results/departures_{preset}.json has no row {name}: run "
+                f"`python -m benchmarks.departures {preset}`"
+            )
+        rows.append(
+            {
+                "setting": f"`{name}`",
+                earlier.preset: format_value(getattr(earlier, name)),
+                preset: format_value(getattr(later, name)),
+                "why": REASONS[preset][name],
+                "regret without it": summary(regrets[name]),
+            }
+        )
+    runs = len(regrets[preset])
+    return (
+        f"Over the training seeds 0 to {runs - 1}, the regret of `{preset}` is "
+        f"{summary(regrets[preset])}; that of `{earlier.preset}` is "
+        f"{summary(regrets[earlier.preset])}.\n\n{markdown(rows)}"
+    )
+
+
+def choosing() -> str:
+    """Returns the settings beside `reference`, on seeds that no other result is reported for."""
+    rows = rows_of("choosing")
+    expected = [arm.partition(":")[0] for arm in ARMS]
+    assert [row["training"] for row in rows] == expected, "run benchmarks.choosing again"
+    return markdown(
+        [{"settings": row["training"], "regret": summary(row["regrets"])} for row in rows]
+    )

@@ -1,0 +1,52 @@
+"""Why each preset departs from the earlier one, setting by setting.
+
+`python -m benchmarks.tables` puts these words beside the measured regrets in docs/presets.md.
+"""
+
+from __future__ import annotations
+
+REASONS: dict[str, dict[str, str]] = {
+    "reference": {
+        "max_episode_steps": "the rest of an episode only balances; shorter episodes show the way "
+        "up more often",
+        "replay_capacity": "a small buffer holds the last episodes only; near the end almost all "
+        "of them show balancing, and the network forgets how to swing up",
+        "updates_per_episode": "one update per episode does not spread the values from the upright "
+        "position (`update-starvation`)",
+        "learning_rate_schedule": "with a constant rate the policy jumps between good and bad "
+        "until the last episode; with the cosine it settles",
+        "target_update": "removes `no-target-network`; with the other changes it gains little on "
+        "this task, because γ and the cosine already keep the values stable",
+    },
+    "swingup": {
+        "episodes": "shorter episodes, so more of them",
+        "max_episode_steps": "longer episodes fill the replay buffer with balancing",
+        "replay_capacity": "a swing-up is longer, so more of its transitions are kept",
+        "batch_size": "smaller gradient noise, where returns differ by hundreds; its effect "
+        "depends on the processor",
+        "discount": "the γ of `reference` does not look far enough ahead to reach from a swing to "
+        "the top",
+        "reward_scale": "about 1 - γ: then the values are about as large as one reward, which "
+        "suits Adam's step",
+        "epsilon_decay": "exploration lasts for the same share of the longer run",
+        "updates_per_episode": "about as many updates per transition as `reference`",
+    },
+    "cartpole": {
+        "episodes": "the slowest of the training seeds used for choosing needs so many",
+        "replay_capacity": "the whole run: without the early falls in the buffer, the values may "
+        "diverge near the end",
+        "reward_scale": "1 - γ: then the values are about as large as one reward, which suits "
+        "Adam's step",
+        "double_q": "the maximum of two noisy values is too high on average, and here only falling "
+        "lowers it",
+        "epsilon_schedule": "exploration continues when the episodes are long",
+        "epsilon_decay": "ε reaches its lowest value early in the run",
+        "train_frequency": "one compiled call makes all updates of an episode; without it the "
+        "learning rate is constant too",
+        "updates_per_episode": "about one update for each few steps of a long episode",
+        "weight_decay": "limits the values to what a policy can earn",
+        "learning_rate": "the cosine passes the smaller rates anyway",
+        "learning_rate_schedule": "with a constant rate the policy jumps until the last episode",
+        "tau": "the target network follows faster",
+    },
+}

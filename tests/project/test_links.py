@@ -1,0 +1,59 @@
+"""The links of README.md and docs: each leads to a file, and each anchor to a heading."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+DOCUMENTS = sorted(ROOT.glob("*.md")) + sorted(ROOT.glob("docs/*.md"))
+_CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+
+
+def links(text: str) -> list[str]:
+    """Returns the targets of a page's links and pictures."""
+    return re.findall(r"\]\(([^)\s]+)\)", _CODE.sub("", text))
+
+
+def anchors(page: Path) -> set[str]:
+    """Returns the anchors of a page's headings, as GitHub and Sphinx make them."""
+    text = _CODE.sub("", page.read_text(encoding="utf-8"))
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {
+        re.sub(r"[^\w -]", "", heading.lower()).strip().replace(" ", "-") for heading in headings
+    }
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_to_files_and_headings(page: Path) -> None:
+    for link in links(page.read_text(encoding="utf-8")):
+        if link.startswith("https://"):
+            continue
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        assert target.is_file(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+def test_other_links_are_safe_ones() -> None:
+    for page in DOCUMENTS:
+        assert "](http:" not in page.read_text(encoding="utf-8")
+
+
+def test_index_links_to_each_page_and_contains_it() -> None:
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    pages = [path.name for path in ROOT.glob("docs/*.md") if path.name != "index.md"]
+    linked = [link for link in links(index) if link.endswith(".md")]
+    assert sorted(linked) == sorted(pages)
+    (contained,) = re.findall(r"^```\{toctree\}\n:hidden:\n\n(.*?)^```$", index, re.M | re.S)
+    assert contained.split() == [link.removesuffix(".md") for link in linked]
+
+
+def test_index_begins_like_the_readme() -> None:
+    first = [
+        (ROOT / name).read_text(encoding="utf-8").split("\n\n")[1]
+        for name in ("README.md", "docs/index.md")
+    ]
+    assert first[0] == first[1]
