@@ -32,18 +32,13 @@ REASONS: dict[str, dict[str, str]] = {
         "updates_per_episode": "about as many updates per transition as `reference`",
     },
     "cartpole": {
-        "episodes": "the slowest of the training seeds used for choosing needs so many",
-        "replay_capacity": "the whole run: without the early falls in the buffer, the values may "
-        "diverge near the end",
+        "replay_capacity": "the whole run: without the early falls in the buffer, the network "
+        "forgets how the pole falls",
         "reward_scale": "1 - γ: then the values are about as large as one reward, which suits "
         "Adam's step",
-        "double_q": "the maximum of two noisy values is too high on average, and here only falling "
-        "lowers it",
-        "epsilon_schedule": "exploration continues when the episodes are long",
-        "epsilon_decay": "ε reaches its lowest value early in the run",
         "train_frequency": "one compiled call makes all updates of an episode; without it the "
         "learning rate is constant too",
-        "updates_per_episode": "about one update for each few steps of a long episode",
+        "updates_per_episode": "fewer do not suffice for every training seed",
         "weight_decay": "limits the values to what a policy can earn",
         "learning_rate": "the cosine passes the smaller rates anyway",
         "learning_rate_schedule": "with a constant rate the policy jumps until the last episode",

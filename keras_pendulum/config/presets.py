@@ -77,15 +77,11 @@ _CARTPOLE_ORIGINAL = Config(
 _CARTPOLE = replace(
     _CARTPOLE_ORIGINAL,
     preset="cartpole",
-    episodes=800,
     # The whole run: without the early falls in the buffer, the values diverge.
-    replay_capacity=400_000,
+    replay_capacity=300_000,
     reward_scale=0.01,
-    double_q=True,
-    epsilon_schedule="episodes",
-    epsilon_decay=0.98,
     train_frequency="episode",
-    updates_per_episode=120,
+    updates_per_episode=60,
     weight_decay=0.05,
     learning_rate=1e-3,
     learning_rate_schedule="cosine",
