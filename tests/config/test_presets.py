@@ -105,7 +105,7 @@ def test_cartpole_has_its_tuned_numbers() -> None:
         replay_capacity=300_000,
         reward_scale=0.01,
         train_frequency="episode",
-        updates_per_episode=60,
+        updates_per_episode=80,
         weight_decay=0.05,
         learning_rate=1e-3,
         learning_rate_schedule="cosine",
