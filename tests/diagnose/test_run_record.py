@@ -39,7 +39,7 @@ def first(record: RunRecord) -> str:
 
 
 def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> None:
-    assert record.torque_fit(TORQUES, 1.0) == pytest.approx((1, 1), abs=0.01)
+    assert record.motion_fit(TORQUES) == pytest.approx((1, 1), abs=0.01)
     assert record.reward_fit(TORQUES) == pytest.approx((1, 1), abs=1e-4)
     assert record.shifted_reward_fit(TORQUES) < 0.9999
     assert record.terminal == 0
