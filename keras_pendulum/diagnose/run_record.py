@@ -108,14 +108,3 @@ class RunRecord:
     def terminal(self) -> float:
         """The share of the stored transitions that end their episode."""
         return float(self.replay.terminated.mean())
-
-    @property
-    def last_loss(self) -> float:
-        """The mean loss of the last tenth of the episodes over the lowest tenth before."""
-        losses = np.array([record.loss for record in self.history])
-        losses = losses[np.isfinite(losses)]
-        if len(losses) < 20:
-            return 1.0
-        part = len(losses) // 10
-        tenths = losses[: 10 * part].reshape(10, part).mean(axis=1)
-        return float(tenths[-1] / max(tenths.min(), 1e-12))
