@@ -193,7 +193,8 @@ def undetermined(e: Evidence) -> Finding | None:
     """Says that the values are wrong without a known reason."""
     m = e.measurement
     right = m.value.correlation > 0.98 and 0.8 < m.value.slope < 1.25
-    if right and m.advantage.correlation > 0.5:  # a regret of such a network is a matter of time
+    # A small regret of such a network is a matter of time.
+    if right and m.advantage.correlation > 0.5 and m.regret < 3 * m.little:
         return None
     evidence = f"correlation of the values {m.value.correlation:.2f}, of the advantages "
     evidence += f"{m.advantage.correlation:.2f}"
