@@ -1,8 +1,8 @@
 """How often a diagnosis finds a fault in a healthy network.
 
-    python -m benchmarks.diagnosis_healthy FOLDER [FIRST_SEED]
+    python -m benchmarks.diagnosis_healthy FOLDER [FIRST_SEED PERCENT]
 
-Trains 100 networks without a fault in FOLDER: with the settings of a healthy run of
+Trains 100 networks, or this share of them, without a fault in FOLDER: with the settings of a healthy run of
 `benchmarks.faults`, by this package, by the PyTorch twin of tests/torch and by Stable-Baselines3,
 and with the presets themselves. COUNTS says how many of each. Each is diagnosed alone, and with its
 run's record where it has one. The command may be stopped and started again. Remove
@@ -57,10 +57,10 @@ class Network:
         return f"{kind}_g{config.gravity:g}_{size}_{config.activation}_{config.seed}"
 
 
-def networks(first_seed: int) -> Iterator[Network]:
-    """Yields the networks. The first of a preset is the shipped one."""
+def networks(first_seed: int, percent: int = 100) -> Iterator[Network]:
+    """Yields so many of the networks, but one of each kind. The first of a preset is shipped."""
     for kind, count in COUNTS.items():
-        for index in range(count):
+        for index in range(max(1, round(count * percent / 100))):
             seed = first_seed + index
             if kind in ("reference", "swingup"):
                 yield Network(kind, preset(kind) if index == 0 else preset(kind, seed=seed))
@@ -146,7 +146,7 @@ def diagnose_network(network: Network, folder: Path) -> dict[str, Any]:
 
     config, path = network.config, train(network, folder)
     alone = kp.diagnose(path, gravity=config.gravity, discount=config.discount)
-    result = {
+    result: dict[str, Any] = {
         "network": network.name,
         "kind": network.kind,
         "regret": round(alone.measurement.regret, 2),
@@ -179,7 +179,7 @@ def summarize(results: list[dict[str, Any]]) -> list[Row]:
     return rows
 
 
-def main(folder: str, first_seed: str = "600") -> None:
+def main(folder: str, first_seed: str = "600", percent: str = "100") -> None:
     """Trains, diagnoses and writes the results."""
     path = Path(folder)
     path.mkdir(parents=True, exist_ok=True)
@@ -187,14 +187,14 @@ def main(folder: str, first_seed: str = "600") -> None:
     lines = file.read_text("utf-8").splitlines() if file.exists() else []
     known = {json.loads(line)["network"]: json.loads(line) for line in lines}
     results = []
-    for network in networks(int(first_seed)):
+    for network in networks(int(first_seed), int(percent)):
         if network.name not in known:
             known[network.name] = diagnose_network(network, path)
             with file.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(known[network.name]) + "\n")
             print(network.name, known[network.name]["findings"], flush=True)
         results.append(known[network.name])
-    command = f"python -m benchmarks.diagnosis_healthy FOLDER {first_seed}"
+    command = f"python -m benchmarks.diagnosis_healthy FOLDER {first_seed} {percent}"
     write("diagnosis_healthy", command, summarize(results))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import reduce
 from itertools import combinations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,8 +90,10 @@ class Case:
     @property
     def config(self) -> Config:
         """The settings of the run."""
-        settings = reduce(lambda found, each: found | each.settings, self.trainings, {})
-        return replace(self.healthy, **settings)
+        config = self.healthy
+        for training in self.trainings:
+            config = replace(config, **training.settings)
+        return config
 
     @property
     def declared(self) -> Config:
