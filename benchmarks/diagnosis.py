@@ -11,24 +11,23 @@ again. Remove FOLDER/single.jsonl after a change of the rules.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import asdict, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.labelled_networks import FAULTS, Case, single_cases, subject_of, train_case
 from benchmarks.report import RESULTS, Row, write
+from benchmarks.resumable import Result, measure_each
 
 HEALTHY = "healthy"
 ROWS = [*FAULTS, HEALTHY]
 COLUMNS = [*FAULTS, "undetermined", "no finding"]
-Result = dict[str, Any]
 
 
 def diagnose_case(case: Case, folder: Path) -> Result:
@@ -45,44 +44,30 @@ def diagnose_case(case: Case, folder: Path) -> Result:
         record = replace(read_record(checkpoint), config=case.declared)
         known = diagnose_measurement(measurement, record)
     return {
-        "case": asdict(case),
+        "faults": case.names,
         "regret": round(measurement.regret, 2),
         "little": round(measurement.little, 2),
         "network": [finding.name for finding in alone.findings],
-        "run": [finding.name for finding in known.findings],
+        "findings": [finding.name for finding in known.findings],
         "notes": [finding.name for finding in known.notes],
     }
 
 
 def diagnose_cases(cases: Iterable[Case], folder: str, name: str) -> list[Result]:
     """Returns the results of all cases. Those in the file FOLDER/NAME.jsonl are used again."""
-    path = Path(folder)
-    path.mkdir(parents=True, exist_ok=True)
-    file = path / f"{name}.jsonl"
-    lines = file.read_text("utf-8").splitlines() if file.exists() else []
-    known = {json.dumps(json.loads(line)["case"]): json.loads(line) for line in lines}
-    results = []
-    for case in cases:
-        key = json.dumps(asdict(case))
-        if key not in known:
-            known[key] = diagnose_case(case, path)
-            with file.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(known[key]) + "\n")
-            print(*case.faults, found(known[key]), flush=True)
-        results.append(known[key])
-    return results
+    items = ((case.key, partial(diagnose_case, case, Path(folder))) for case in cases)
+    return measure_each(items, folder, name)
 
 
-def found(result: Result, kind: str = "run") -> list[str]:
-    """Returns the findings: with the "run" where that knows more, or of the "network" alone."""
+def found(result: Result, kind: str = "findings") -> list[str]:
+    """Returns the findings: with the run's record where that knows more, or of the "network"."""
     findings: list[str] = result[kind]
     return findings or ["no finding"]
 
 
 def fault_of(result: Result) -> str:
     """Returns the fault of a result, or "healthy"."""
-    faults = result["case"]["faults"]
-    return str(faults[0][0]) if faults else HEALTHY
+    return str(result["faults"][0]) if result["faults"] else HEALTHY
 
 
 def is_costly(result: Result) -> bool:
@@ -109,11 +94,11 @@ def _row(name: str, results: list[Result]) -> Row:
         fault = fault_of(result)
         return found(result, kind)[0] == ("no finding" if fault == HEALTHY else fault)
 
-    wrong = Counter(found(result)[0] for result in costly if not is_right(result, "run"))
+    wrong = Counter(found(result)[0] for result in costly if not is_right(result, "findings"))
     instead = ", ".join(f"{name} {count}" for name, count in wrong.most_common()) or "–"
     return {
         "fault": name,
-        "named first": share(sum(is_right(each, "run") for each in costly), len(costly)),
+        "named first": share(sum(is_right(each, "findings") for each in costly), len(costly)),
         "from the network alone": share(
             sum(is_right(each, "network") for each in costly), len(costly)
         ),

@@ -2,21 +2,21 @@
 
     python -m benchmarks.diagnosis_healthy FOLDER [FIRST_SEED PERCENT]
 
-Trains 100 networks, or this share of them, without a fault in FOLDER: with the settings of a healthy run of
-`benchmarks.faults`, by this package, by the PyTorch twin of tests/torch and by Stable-Baselines3,
-and with the presets themselves. COUNTS says how many of each. Each is diagnosed alone, and with its
-run's record where it has one. The command may be stopped and started again. Remove
-FOLDER/healthy.jsonl after a change of the rules. Needs the extra `bench`.
+Trains 100 networks without a fault in FOLDER, or this share of them: with the settings of a healthy
+run of `benchmarks.faults`, by this package, by the PyTorch twin of tests/torch and by
+Stable-Baselines3, and with the presets themselves. COUNTS says how many of each. Each is diagnosed
+alone, and with its run's record where it has one. The command may be stopped and started again.
+Remove FOLDER/healthy.jsonl after a change of the rules. Needs the extra `bench`.
 """
 
 from __future__ import annotations
 
 import importlib.util
-import json
 import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from benchmarks.faults import ACTIVATIONS, SIZES
 from benchmarks.labelled_networks import Case, train_config
 from benchmarks.peers import train_sb3
 from benchmarks.report import Row, write
+from benchmarks.resumable import Result, measure_each
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import preset
 
@@ -138,7 +139,7 @@ def _train_twin(config: Config) -> list[NDArray[np.float32]]:
     return weights
 
 
-def diagnose_network(network: Network, folder: Path) -> dict[str, Any]:
+def diagnose_network(network: Network, folder: Path) -> Result:
     """Returns the findings on a network, alone and with its run's record."""
     import keras_pendulum as kp
     from keras_pendulum.diagnose.diagnosis import diagnose_measurement
@@ -146,8 +147,7 @@ def diagnose_network(network: Network, folder: Path) -> dict[str, Any]:
 
     config, path = network.config, train(network, folder)
     alone = kp.diagnose(path, gravity=config.gravity, discount=config.discount)
-    result: dict[str, Any] = {
-        "network": network.name,
+    result: Result = {
         "kind": network.kind,
         "regret": round(alone.measurement.regret, 2),
         "little": round(alone.measurement.little, 2),
@@ -159,7 +159,7 @@ def diagnose_network(network: Network, folder: Path) -> dict[str, Any]:
     return result
 
 
-def summarize(results: list[dict[str, Any]]) -> list[Row]:
+def summarize(results: list[Result]) -> list[Row]:
     """Returns a row for each kind, and one for all."""
     rows = []
     for kind in [*COUNTS, "all"]:
@@ -181,19 +181,9 @@ def summarize(results: list[dict[str, Any]]) -> list[Row]:
 
 def main(folder: str, first_seed: str = "600", percent: str = "100") -> None:
     """Trains, diagnoses and writes the results."""
-    path = Path(folder)
-    path.mkdir(parents=True, exist_ok=True)
-    file = path / "healthy.jsonl"
-    lines = file.read_text("utf-8").splitlines() if file.exists() else []
-    known = {json.loads(line)["network"]: json.loads(line) for line in lines}
-    results = []
-    for network in networks(int(first_seed), int(percent)):
-        if network.name not in known:
-            known[network.name] = diagnose_network(network, path)
-            with file.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(known[network.name]) + "\n")
-            print(network.name, known[network.name]["findings"], flush=True)
-        results.append(known[network.name])
+    chosen = networks(int(first_seed), int(percent))
+    items = ((each.name, partial(diagnose_network, each, Path(folder))) for each in chosen)
+    results = measure_each(items, folder, "healthy")
     command = f"python -m benchmarks.diagnosis_healthy FOLDER {first_seed} {percent}"
     write("diagnosis_healthy", command, summarize(results))
 

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import sys
 
-from benchmarks.diagnosis import Result, diagnose_cases, found, is_costly, share
+from benchmarks.diagnosis import diagnose_cases, found, is_costly, share
 from benchmarks.labelled_networks import PAIRS, pair_cases
 from benchmarks.report import Row, write
+from benchmarks.resumable import Result
 
 
 def summarize(results: list[Result]) -> list[Row]:
@@ -39,7 +40,7 @@ def _row(name: str, results: list[Result]) -> Row:
 
 
 def _names(result: Result) -> set[str]:
-    return {fault for fault, _ in result["case"]["faults"]}
+    return set(result["faults"])
 
 
 def main(folder: str, first_seed: str = "500", rounds: str = "9") -> None:

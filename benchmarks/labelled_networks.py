@@ -70,12 +70,18 @@ class Case:
         return [ACTING[fault][variant] for fault, variant in self.faults if fault in ACTING]
 
     @property
-    def folder(self) -> str:
-        """The name of the run's folder; a fault of the acting has that of the healthy run."""
-        kinds = [f"{fault}_{variant}" for fault, variant in self.faults if fault in TRAINING]
+    def key(self) -> str:
+        """A name of the case."""
+        kinds = [f"{fault}_{variant}" for fault, variant in self.faults]
         size = "-".join(map(str, self.hidden_units))
         parts = ["+".join(kinds) or "healthy", f"g{self.gravity:g}", size, self.activation]
         return "_".join([*parts, str(self.seed)])
+
+    @property
+    def folder(self) -> str:
+        """The name of the run's folder; a fault of the acting has that of the healthy run."""
+        faults = tuple(each for each in self.faults if each[0] in TRAINING)
+        return replace(self, faults=faults).key
 
     @property
     def healthy(self) -> Config:
