@@ -127,12 +127,15 @@ def other_task(e: Evidence) -> Finding | None:
     candidates = [
         ("other-gravity", f"g = {gravity:g}", gravity, match)
         for gravity, match in comparisons.match_gravities(m).items()
-        if abs(gravity - m.subject.gravity) > 0.3 * m.subject.gravity
+        # Stored transitions have shown which gravity acted.
+        if e.record is None and abs(gravity - m.subject.gravity) > 0.3 * m.subject.gravity
     ] + [
         ("other-discount", f"γ = {discount:g}", None, match)
         for discount, match in comparisons.match_discounts(m).items()
         if abs(discount - m.subject.discount) > 0.25 * (1 - m.subject.discount)
     ]
+    if not candidates:
+        return None
     name, label, gravity, best = max(candidates, key=lambda item: item[3].scaled_score)
     if best.scaled_score < max(0.55, declared + 0.35 * (1 - declared)):
         return None

@@ -101,6 +101,13 @@ def test_another_gravity_of_the_stored_transitions_is_named(record: RunRecord) -
     assert finding.evidence == "stored transitions of a pendulum with g = 1.00"
 
 
+def test_stored_transitions_exclude_another_gravity(record: RunRecord) -> None:
+    two = subject(lambda o: exact_values(o, gravity=2.0))
+    assert diagnose_subject(two).notes[0].name == "other-gravity"
+    diagnosis = diagnose_subject(two, record)
+    assert "other-gravity" not in [each.name for each in diagnosis.findings + diagnosis.notes]
+
+
 def test_few_recorded_updates_explain_small_values(record: RunRecord) -> None:
     noisy = subject(lambda o: 0.5 * exact_values(o).mean(axis=1)[:, None] + np.sin(9 * o @ NOISE))
     history = [each._replace(updates=500) for each in record.history]
