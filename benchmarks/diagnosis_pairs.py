@@ -43,7 +43,7 @@ def _names(result: Result) -> set[str]:
     return set(result["faults"])
 
 
-def main(folder: str, first_seed: str = "508", rounds: str = "9") -> None:
+def main(folder: str, first_seed: str = "500", rounds: str = "9") -> None:
     """Trains, diagnoses and writes the results."""
     seeds = range(int(first_seed), int(first_seed) + int(rounds))
     results = diagnose_cases(pair_cases(seeds), folder, "pairs")
