@@ -38,6 +38,9 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "finer torques": code_blocks.finer_torques,
     "tests of the files": code_blocks.file_tests,
     "files of the DQN": code_blocks.dqn_files,
+    "measured diagnosis": lambda: markdown(rows_of("diagnosis")),
+    "healthy networks": lambda: markdown(rows_of("diagnosis_healthy")),
+    "two faults": lambda: markdown(rows_of("diagnosis_pairs")),
 }
 
 

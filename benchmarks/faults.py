@@ -1,14 +1,13 @@
-"""Networks with a known fault: runs with one seam swapped, and changes to a healthy network.
+"""Faults: runs with changed settings or one seam swapped, and changes to a healthy network.
 
-`benchmarks.diagnosis` measures with them how often a diagnosis names the fault.
+`benchmarks.labelled_networks` makes networks with them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -18,14 +17,11 @@ from keras_pendulum.config.config import Config
 from keras_pendulum.environments.actions import TorqueGrid
 from keras_pendulum.train.run import Run
 
-if TYPE_CHECKING:
-    from keras_pendulum.diagnose.subject import Subject
-
 SIZES = ((64, 64), (128, 64, 32), (32, 32))
 ACTIVATIONS = ("tanh", "relu")
 
 # Short runs that learn: on average they lose about 4 at g = 1.
-_HEALTHY = Config(
+HEALTHY = Config(
     episodes=150,
     max_episode_steps=100,
     updates_per_episode=100,
@@ -34,8 +30,8 @@ _HEALTHY = Config(
     tau=0.02,
     learning_rate=2e-3,
 )
-_HEALTHY_10 = replace(
-    _HEALTHY,
+HEALTHY_10 = replace(
+    HEALTHY,
     gravity=10.0,
     episodes=600,
     max_episode_steps=60,
@@ -67,51 +63,6 @@ class Acting:
     q_values: Map = lambda q: q
     gravity: float | None = None  # that the user declares
     weights: Callable[[list[Any]], list[Any]] = lambda weights: weights
-
-
-@dataclass(frozen=True)
-class Case:
-    """A network of the labelled set."""
-
-    fault: str
-    variant: str
-    gravity: float
-    hidden_units: tuple[int, ...]
-    activation: str
-    seed: int
-
-    @property
-    def folder(self) -> str:
-        """The name of the run's folder; a fault of the acting has that of the healthy run."""
-        kind = (self.fault, self.variant) if self.fault in TRAINING else ("healthy", "plain")
-        size = "-".join(map(str, self.hidden_units))
-        return "_".join([*kind, f"g{self.gravity:g}", size, self.activation, str(self.seed)])
-
-    @property
-    def declared(self) -> Config:
-        """The settings that the user believes in."""
-        config = self.config
-        for name in TRAINING[self.fault][self.variant].hidden if self.fault in TRAINING else ():
-            config = replace(config, **{name: getattr(self._healthy, name)})
-        acting = ACTING.get(self.fault, {}).get(self.variant, Acting())
-        return config if acting.gravity is None else replace(config, gravity=acting.gravity)
-
-    @property
-    def _healthy(self) -> Config:
-        healthy = _HEALTHY_10 if self.gravity == 10 else _HEALTHY
-        return replace(
-            healthy,
-            hidden_units=self.hidden_units,
-            activation=self.activation,
-            seed=self.seed,
-        )
-
-    @property
-    def config(self) -> Config:
-        """The settings of the run."""
-        if self.fault in TRAINING:
-            return replace(self._healthy, **TRAINING[self.fault][self.variant].settings)
-        return self._healthy
 
 
 class _Replay:
@@ -192,7 +143,6 @@ def _reward(change: Callable[[float], float]) -> Change:
 _NOISE = np.random.RandomState(0)
 
 TRAINING: dict[str, dict[str, Training]] = {
-    "healthy": {"plain": Training({})},
     "too-few-updates": {
         "one": Training({"updates_per_episode": 1, "learning_rate": 1e-3}),
         "two": Training({"updates_per_episode": 2, "learning_rate": 1e-3}),
@@ -235,6 +185,7 @@ TRAINING: dict[str, dict[str, Training]] = {
     "forgetting": {
         "thousand": Training({"replay_capacity": 1000, "epsilon_decay": 0.9}),
         "small": Training({"replay_capacity": 500, "epsilon_decay": 0.9}),
+        "longer": Training({"replay_capacity": 1000, "epsilon_decay": 0.974}),  # at g = 10
     },
     "exploration": {
         "never-falls": Training({"epsilon_start": 1.0, "epsilon_decay": 1.0}),
@@ -323,28 +274,13 @@ ACTING: dict[str, dict[str, Acting]] = {
 }
 
 
-def cases(seeds: range) -> list[Case]:
-    """Returns the cases of the labelled set, a round of all faults for each seed."""
-    rounds = []
-    for seed in seeds:
-        index = seed % 100
-        gravity = 10.0 if index % 4 == 3 else 1.0
-        size, activation = SIZES[index % 3], ACTIVATIONS[index // 2 % 2]
-        for fault, variants in (TRAINING | ACTING).items():
-            names = [name for name in variants if _exists(fault, name, gravity)]
-            if names:
-                variant = names[index % len(names)]
-                rounds.append(Case(fault, variant, gravity, size, activation, seed))
-    return rounds
-
-
-def _exists(fault: str, variant: str, gravity: float) -> bool:
+def exists(fault: str, variant: str, gravity: float) -> bool:
     """Returns whether the variant is a fault at the gravity of the training."""
     if fault == "other-gravity":
         return variant in (("ten", "five") if gravity == 1 else ("one", "three"))
     if gravity == 1:
-        return (fault, variant) != ("other-discount", "seven")
-    return fault in ("healthy", "too-few-updates", "untrained-outputs", *ACTING) or (
+        return variant not in ("seven", "longer")
+    return fault in ("too-few-updates", "untrained-outputs", *ACTING) or (
         (fault, variant)
         in {
             ("reward-sign", "negated"),
@@ -353,63 +289,8 @@ def _exists(fault: str, variant: str, gravity: float) -> bool:
             ("misaligned-transitions", "same-observation"),
             ("misaligned-transitions", "action-before"),
             ("other-discount", "seven"),
-            ("forgetting", "thousand"),
+            ("forgetting", "longer"),
             ("learning-rate", "large"),
             ("narrow-starts", "upright"),
         }
-    )
-
-
-def train_case(case: Case, folder: Path) -> Path:
-    """Trains the network of a case if `folder` has none; returns its checkpoint.
-
-    A run that diverges ends there: its checkpoint holds the last finite weights.
-    """
-    from keras_pendulum.errors import UserError
-    from keras_pendulum.train.checkpoint import save_checkpoint
-    from keras_pendulum.train.loop import train_episodes
-    from keras_pendulum.train.run import make_run
-
-    path = folder / case.folder / "pendulum_weight.h5"
-    if not path.exists():
-        trained = replace(case, fault="healthy", variant="plain")
-        case = case if case.fault in TRAINING else trained
-        run = make_run(case.config)
-        TRAINING[case.fault][case.variant].swap(run)
-        try:
-            for _ in train_episodes(run):
-                pass
-        except UserError as error:
-            print(f"{case.folder}: {error}")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        save_checkpoint(run, path)
-    return path
-
-
-def subject_of(case: Case, checkpoint: Path) -> Subject:
-    """Returns the agent of a case with the task that its user declares."""
-    from keras_pendulum.diagnose.subject import Subject
-    from keras_pendulum.dqn.policy import greedy_policy
-    from keras_pendulum.storage.weights import load_weights
-
-    network, declared = load_weights(checkpoint), case.declared
-    acting = ACTING.get(case.fault, {}).get(case.variant, Acting())
-    network.set_weights(acting.weights(network.get_weights()))
-    greedy, torques = greedy_policy(network), TorqueGrid().torques
-
-    def q_values(observations: NDArray[np.float32]) -> NDArray[Any]:
-        return acting.q_values(greedy.q_values(acting.observations(observations)).astype(float))
-
-    def act(observations: NDArray[np.float32]) -> NDArray[np.float64]:
-        return torques[q_values(observations).argmax(axis=1)]
-
-    return Subject(
-        case.folder,
-        declared.gravity or 0.0,
-        declared.discount,
-        act,
-        q_values,
-        torques,
-        declared.reward_scale,
-        network,
     )

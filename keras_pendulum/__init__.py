@@ -6,6 +6,8 @@ The names below are the public API. The first use of one imports what it needs.
 from __future__ import annotations
 
 import importlib
+import sys
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.keras_registration import register_with_keras
@@ -70,6 +72,17 @@ _MODULES = {
     "train.train_dqn": ("TrainingResult", "train_dqn"),
 }
 
+
+class _Package(ModuleType):
+    """This package, in which the room `diagnose` does not hide the function of the same name."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # The import of a room sets it as an attribute here.
+        if not (name == "diagnose" and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 set_environment_defaults()
 register_with_keras()
 

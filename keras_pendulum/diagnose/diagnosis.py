@@ -49,7 +49,10 @@ class Diagnosis:
         measurement = self.measurement
         regret = f"regret {measurement.regret:.2f}"
         if not self.findings:
-            return f"No finding: {regret}, and up to {measurement.little:.1f} is little."
+            little = f"up to {measurement.little:.1f} is little"
+            if measurement.regret <= measurement.little:
+                return f"No finding: {regret}, and {little}."
+            return f"No finding, but {regret}, where {little}: train for longer."
         first = self.findings[0]
         cost = "" if first.cost is None else f"; without it {first.cost:.1f} more return"
         return f"{first.name}: {first.evidence} (healthy: {first.healthy}); {regret}{cost}."
@@ -186,8 +189,12 @@ def make_subject(
 
 def diagnose_subject(subject: Subject, record: RunRecord | None = None) -> Diagnosis:
     """Returns the diagnosis of an agent whose task is declared."""
-    measurement = measure(subject)
-    if subject.raw_q is None:
+    return diagnose_measurement(measure(subject), record)
+
+
+def diagnose_measurement(measurement: Measurement, record: RunRecord | None = None) -> Diagnosis:
+    """Returns the diagnosis of a measured agent, without and with its run's record."""
+    if measurement.subject.raw_q is None:
         return _diagnose_bare_policy(measurement)
     evidence = Evidence(measurement, record)
     little = measurement.finite and measurement.regret <= measurement.little

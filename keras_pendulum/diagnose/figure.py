@@ -84,8 +84,9 @@ def _draw_repairs(axes: Axes, measurement: Measurement, findings: Sequence[Findi
         if finding.repair is not None:
             names.append(textwrap.fill(finding.repair.name, 24).replace("$", r"\$"))
             regrets.append(finding.repair.regret)
-    axes.barh(names[::-1], regrets[::-1], color="tab:orange")
+    axes.barh(names, regrets, height=0.6, color="tab:orange")
+    axes.set_ylim(max(len(names), 3) - 0.5, -1)  # from the top, with room for the legend
     axes.axvline(measurement.little, color="black", linestyle="--", label="little")
     axes.set_xlabel("Regret (return below the best possible)")
     axes.set_title("Repairs without training", fontsize="medium")
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc="upper right")

@@ -27,6 +27,7 @@ from keras_pendulum.diagnose.training_rules import (
     misaligned,
     narrow_starts,
     overestimation,
+    saturated_layer,
     stored_transitions,
     too_few_updates,
     undetermined,
@@ -35,13 +36,15 @@ from keras_pendulum.diagnose.training_rules import (
 
 # The values of such a run are small, or stop at the rewards of one step.
 _EXPLAINS: dict[str, tuple[str, ...]] = {
+    "reward-sign": ("observation-map", "overestimation"),
     "no-bootstrapping": ("too-few-updates", "reward-scale", "other-discount"),
     "other-discount": ("too-few-updates", "reward-scale"),
     "reward-scale": ("too-few-updates",),
-    "untrained-outputs": ("too-few-updates", "no-bootstrapping", "learning-rate"),
+    "untrained-outputs": ("too-few-updates", "no-bootstrapping"),
     "observation-map": ("too-few-updates", "narrow-starts", "other-gravity", "other-discount"),
     "too-few-updates": ("narrow-starts",),
-    "misaligned-transitions": ("too-few-updates", "learning-rate"),
+    "misaligned-transitions": ("too-few-updates",),
+    "broken-network": ("too-few-updates", "no-bootstrapping", "narrow-starts"),
 }
 
 RULES: tuple[Callable[[Evidence], Finding | None], ...] = (
@@ -57,17 +60,18 @@ RULES: tuple[Callable[[Evidence], Finding | None], ...] = (
     other_task,
     reward_scale,
     too_few_updates,
+    learning_rate,
     exploration,
     overestimation,
     forgetting,
     narrow_starts,
-    learning_rate,
+    saturated_layer,
     misaligned,
 )
 
 
 def find(evidence: Evidence) -> list[Finding]:
-    """Returns the findings of all rules, each name once; at least `undetermined`.
+    """Returns the findings of all rules, each name once.
 
     What another finding explains is left out.
     """
@@ -76,7 +80,7 @@ def find(evidence: Evidence) -> list[Finding]:
         finding = rule(evidence)
         if finding is not None:
             found.setdefault(finding.name, finding)
-            if finding.name == "broken-network":
+            if not evidence.measurement.finite:
                 break
     for name, explained in _EXPLAINS.items():
         if name in found:

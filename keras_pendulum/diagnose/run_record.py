@@ -71,18 +71,21 @@ class RunRecord:
             expected += record.epsilon * max(0, steps)
         return expected
 
-    def torque_fit(self, torques: Array, gravity: float) -> tuple[float, float]:
-        """Returns correlation and gain between the stored torque and the one that acted.
+    def motion_fit(self, torques: Array) -> tuple[float, float]:
+        """Returns the gravity that acted, and the correlation of the stored torque with that too.
 
-        The torque that acted follows from both observations by the equation of motion. Both are 1
-        in a healthy buffer.
+        Gravity and torque are those with which the equation of motion best leads from each stored
+        observation to the next one. The correlation is 1 in a healthy buffer.
         """
         theta, speed = self.states.T
         next_speed = self.replay.next_observation[:, 2].astype(np.float64)
         free = np.abs(next_speed) < MAX_SPEED - 1e-3
-        acted = ((next_speed - speed) / TIME_STEP - 1.5 * gravity * np.sin(theta)) / 3
-        fit = line_fit(acted[free], torques[self.replay.action][free])
-        return fit.correlation, fit.slope
+        acceleration = ((next_speed - speed) / TIME_STEP)[free]
+        stored = torques[self.replay.action][free]
+        causes = np.stack([1.5 * np.sin(theta[free]), 3 * stored], axis=1)
+        (gravity, _), *_ = np.linalg.lstsq(causes, acceleration, rcond=None)
+        acted = acceleration - gravity * causes[:, 0]
+        return float(gravity), line_fit(acted, stored).correlation
 
     def reward_fit(self, torques: Array) -> tuple[float, float]:
         """Returns correlation and factor between the stored rewards and the exact ones.
@@ -105,14 +108,3 @@ class RunRecord:
     def terminal(self) -> float:
         """The share of the stored transitions that end their episode."""
         return float(self.replay.terminated.mean())
-
-    @property
-    def last_loss(self) -> float:
-        """The mean loss of the last tenth of the episodes over the lowest tenth before."""
-        losses = np.array([record.loss for record in self.history])
-        losses = losses[np.isfinite(losses)]
-        if len(losses) < 20:
-            return 1.0
-        part = len(losses) // 10
-        tenths = losses[: 10 * part].reshape(10, part).mean(axis=1)
-        return float(tenths[-1] / max(tenths.min(), 1e-12))

@@ -96,8 +96,3 @@ def training_states(
     epsilon = np.linspace(0.1, 1, len(starts))[random.permutation(len(starts))]
     states = simulate(act, gravity, starts).states.reshape(-1, 2)
     return states[random.permutation(len(states))[:_STATES]]
-
-
-def mirrored(states: Array) -> Array:
-    """Returns the states turned to the other side: -θ and -θ̇."""
-    return -states

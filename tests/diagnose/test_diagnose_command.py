@@ -27,6 +27,12 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def test_function_is_not_hidden_by_the_room_of_its_name() -> None:
+    assert kp.diagnose is diagnose
+    assert kp.diagnose is diagnose  # the first use has imported the room
+    assert command.main.__module__ == "keras_pendulum.diagnose.__main__"
+
+
 def test_first_line_is_the_answer(weights: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main([str(weights)]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -1,3 +1,5 @@
+import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +62,7 @@ def test_exact_values_give_no_finding() -> None:
         ("torque-map", lambda o: np.roll(exact_values(o), 20, axis=1)),
         ("torque-map", lambda o: exact_values(o)[:, np.random.RandomState(3).permutation(41)]),
         ("observation-map", lambda o: exact_values(o * np.array([1, 1, -1], np.float32))),
+        ("observation-map", lambda o: exact_values(o * np.array([-1, 1, 1], np.float32))),
         ("observation-map", lambda o: exact_values(o[:, [1, 0, 2]])),
         ("reward-sign", lambda o: -exact_values(o)),
         ("no-bootstrapping", rewards),
@@ -70,11 +73,25 @@ def test_exact_values_give_no_finding() -> None:
         ("broken-network", lambda o: np.full((len(o), 41), np.nan)),
         ("broken-network", lambda o: np.zeros((len(o), 41))),
         ("broken-network", lambda o: 1e12 * np.sin(50 * exact_values(o))),
+        ("overestimation", lambda o: 1e12 * (2 + np.sin(50 * exact_values(o)))),
         ("overestimation", lambda o: exact_values(o) + 15 * np.abs(np.sin(3 * o @ NOISE))),
     ],
 )
 def test_each_change_of_the_exact_values_is_named_first(fault: str, q_values: Any) -> None:
     assert of(q_values) == fault
+
+
+@pytest.mark.parametrize(
+    ("share", "verdict"),
+    [
+        (0.5, r"No finding, but regret [\d.]+, where up to [\d.]+ is little: train for longer\."),
+        (0.3, r"undetermined: .*"),
+    ],
+)
+def test_right_values_need_more_training_unless_they_cost_much(share: float, verdict: str) -> None:
+    exact = subject(exact_values)
+    weak = replace(exact, act=lambda observations: share * exact.act(observations))
+    assert re.fullmatch(verdict, diagnose_subject(weak).verdict)
 
 
 def test_values_of_another_gravity_are_named_with_it() -> None:
@@ -88,11 +105,18 @@ def test_values_of_another_discount_are_named() -> None:
     assert "other-discount" in [each.name for each in (*found.findings, *found.notes)]
 
 
-def test_what_costs_little_is_a_note() -> None:
-    diagnosis = diagnose_subject(subject(lambda o: 5 * exact_values(o)))
+@pytest.mark.parametrize(
+    ("fault", "q_values"),
+    [
+        ("reward-scale", lambda o: 5 * exact_values(o)),
+        ("torque-map", lambda o: exact_values(o)[:, 20 + (np.arange(41) - 20) // 4]),
+    ],
+)
+def test_what_costs_little_is_a_note(fault: str, q_values: Any) -> None:
+    diagnosis = diagnose_subject(subject(q_values))
     assert diagnosis.findings == []
-    assert [note.name for note in diagnosis.notes] == ["reward-scale"]
-    assert "Note, costs little: reward-scale" in diagnosis.summary()
+    assert [note.name for note in diagnosis.notes] == [fault]
+    assert f"Note, costs little: {fault}" in diagnosis.summary()
 
 
 def test_repair_shows_what_a_reversed_torque_map_costs() -> None:

@@ -14,6 +14,8 @@ from keras_pendulum.diagnose.run_record import RunRecord
 from keras_pendulum.errors import WeightsError
 from keras_pendulum.optimum.dynamics import TORQUES
 
+NOISE = np.random.RandomState(0).normal(size=(3, 41))
+
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
@@ -39,7 +41,7 @@ def first(record: RunRecord) -> str:
 
 
 def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> None:
-    assert record.torque_fit(TORQUES, 1.0) == pytest.approx((1, 1), abs=0.01)
+    assert record.motion_fit(TORQUES) == pytest.approx((1, 1), abs=0.01)
     assert record.reward_fit(TORQUES) == pytest.approx((1, 1), abs=1e-4)
     assert record.shifted_reward_fit(TORQUES) < 0.9999
     assert record.terminal == 0
@@ -90,6 +92,37 @@ def test_small_buffer_is_named(record: RunRecord) -> None:
         for index, each in enumerate(record.history)
     ]
     assert first(replace(changed(record, **fields), history=history)) == "forgetting"
+
+
+def test_another_gravity_of_the_stored_transitions_is_named(record: RunRecord) -> None:
+    agent = subject(lambda o: exact_values(o) * np.sin(20 * o[:, :1]), gravity=10.0)
+    finding = diagnose_subject(agent, record).findings[0]
+    assert finding.name == "other-gravity"
+    assert finding.evidence == "stored transitions of a pendulum with g = 1.00"
+
+
+def test_stored_transitions_exclude_another_gravity(record: RunRecord) -> None:
+    two = subject(lambda o: exact_values(o, gravity=2.0))
+    assert diagnose_subject(two).notes[0].name == "other-gravity"
+    diagnosis = diagnose_subject(two, record)
+    assert "other-gravity" not in [each.name for each in diagnosis.findings + diagnosis.notes]
+
+
+def test_few_recorded_updates_explain_small_values(record: RunRecord) -> None:
+    noisy = subject(lambda o: 0.5 * exact_values(o).mean(axis=1)[:, None] + np.sin(9 * o @ NOISE))
+    history = [each._replace(updates=500) for each in record.history]
+    assert diagnose_subject(noisy).findings[0].name != "too-few-updates"
+    found = diagnose_subject(noisy, replace(record, history=history)).findings
+    assert found[0].name == "too-few-updates"
+    assert found[0].evidence.endswith("after 500 updates")
+
+
+def test_recorded_learning_rate_is_named_beside_another_fault(record: RunRecord) -> None:
+    large = replace(record, config=replace(record.config, learning_rate=0.05))
+    terminal = changed(large, terminated=np.ones_like(record.replay.terminated))
+    agent = subject(lambda o: exact_values(o) * np.sin(20 * o[:, :1]))
+    names = [finding.name for finding in diagnose_subject(agent, terminal).findings]
+    assert names[:2] == ["no-bootstrapping", "learning-rate"]
 
 
 def test_weights_without_a_run_are_refused(tmp_path: Path) -> None:
