@@ -23,9 +23,9 @@ def steps() -> str:
     label = last.removeprefix("+ ").removesuffix(" = reference")
     changes.append(f"{arms['reference']} ({label})")
     return (
-        "The main fault is **one update per 200 steps**. With one change after the other, the "
-        f"regret (mean of {runs} training seeds without the extremes) falls from "
-        f"{arms['original']} to {', '.join(changes[:-1])} and {changes[-1]}.\n"
+        "The main fault is **one update per 200 steps**. The regret (mean of "
+        f"{runs} training seeds without the extremes) is {arms['original']} for the original. With "
+        f"one change after the other it is {', '.join(changes[:-1])} and {changes[-1]}.\n"
     )
 
 
