@@ -73,7 +73,8 @@ NO_UPDATE = [
     (
         kp.preset("cartpole", episodes=3, warmup_episodes=1),
         record(2, 0, environment_steps=70),
-        "its 70 transitions are fewer than one batch. Continue it with --resume --episodes 800, "
+        "its 70 transitions are fewer than one batch. Continue it with --resume --episodes "
+        f"{kp.preset('cartpole').episodes}, "
         "or start another one with a smaller --batch-size (now 128)",
     ),
 ]
