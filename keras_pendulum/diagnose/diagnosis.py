@@ -41,7 +41,7 @@ class Diagnosis:
     measurement: Measurement
     findings: list[Finding]  #: the strongest first
     notes: list[Finding]  #: what costs little
-    limits: list[str]  #: what could not be told
+    limits: list[str]  #: what could not be determined
 
     @property
     def verdict(self) -> str:
@@ -77,7 +77,9 @@ class Diagnosis:
             lines.append(f"   Read: {finding.page}")
         for note in self.notes:
             lines += ["", f"Note, costs little: {note.name}: {note.evidence}"]
-        lines += ["", *(f"Not told: {limit}." for limit in self.limits)] if self.limits else []
+        lines += (
+            ["", *(f"Not determined: {limit}." for limit in self.limits)] if self.limits else []
+        )
         return "\n".join(lines)
 
     def as_json(self) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def as_html(diagnosis: Diagnosis) -> str:
         parts += [f"<h2>{number}. {_text(finding.name)}</h2>", _section(finding)]
     for note in diagnosis.notes:
         parts += [f"<h2>Note, costs little: {_text(note.name)}</h2>", _section(note)]
-    parts += [f"<p>Not told: {_text(limit)}.</p>" for limit in diagnosis.limits]
+    parts += [f"<p>Not determined: {_text(limit)}.</p>" for limit in diagnosis.limits]
     return "\n".join([*parts, "</body></html>", ""])
 
 
