@@ -73,7 +73,8 @@ def _draw_seeds(
     level = discount_alone.lost.sum(axis=0).mean()
     axes.axhline(level, color="black", linestyle="--", label="the discount alone")
     axes.set(title="By training seed", xlabel="Training seed", ylabel="Mean regret")
-    axes.legend()
+    axes.set_ylim(top=1.35 * axes.get_ylim()[1])  # room for the legend above the bars
+    axes.legend(loc="upper left")
 
 
 def _draw_steps(
