@@ -20,7 +20,7 @@ Change = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 
 @dataclass(frozen=True)
 class Match:
-    """How well learned values match those of one hypothesis; 1 is a perfect match."""
+    """The match of learned values with those of one hypothesis; 1 is a perfect match."""
 
     slope: float  # of the values
     value: float  # correlation of the values

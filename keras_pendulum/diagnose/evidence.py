@@ -31,7 +31,7 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """What to do."""
+        """Returns what to do."""
         return TEXTS[self.name].remedy
 
     @property

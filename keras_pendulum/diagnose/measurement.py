@@ -168,7 +168,7 @@ class Measurement:
 
     @cached_property
     def excess(self) -> float:
-        """How far the highest learned value is above the best possible one, in spreads."""
+        """Returns the distance of the highest learned value above the optimum, in spreads."""
         excess = self.learned_q.max(axis=1) - self.exact_q.max(axis=1)
         return float(np.median(excess)) / self.value_spread
 

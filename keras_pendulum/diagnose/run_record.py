@@ -1,4 +1,4 @@
-"""What a run folder adds: its history, and whether its stored transitions obey the pendulum."""
+"""The record of a run folder: its history, and the fit of its transitions to the pendulum."""
 
 from __future__ import annotations
 
