@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from keras_pendulum.diagnose.measurement import Measurement
 from keras_pendulum.diagnose.other_tasks import DISCOUNTS, GRAVITIES, other_value
-from keras_pendulum.diagnose.signals import Array, advantage_fit, value_fit
+from keras_pendulum.diagnose.run_record import RunRecord
+from keras_pendulum.diagnose.signals import Array, advantage_fit, line_fit, value_fit
 from keras_pendulum.diagnose.states import observe
+from keras_pendulum.diagnose.subject import Subject
+from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.optimum.discounted import exact_q
 
 Change = Callable[[NDArray[np.float32]], NDArray[np.float32]]
@@ -78,7 +81,8 @@ def observation_changes() -> dict[str, Change]:
             name = ", ".join(
                 ("-" if sign < 0 else "") + _NAMES[i] for i, sign in zip(order, signs, strict=True)
             )
-            if name != ", ".join(_NAMES):
+            # Both signs turned is the reversed torque: the pendulum is symmetric.
+            if name not in (", ".join(_NAMES), "cos θ, -sin θ, -θ̇"):
                 changes[name] = _reorder(order, signs)
     for name, factor in (("θ̇·π/180", np.pi / 180), ("θ̇·180/π", 180 / np.pi), ("θ̇/8", 1 / 8)):
         changes[f"cos θ, sin θ, {name}"] = _scale(factor)
@@ -94,6 +98,62 @@ def match_observations(measurement: Measurement) -> dict[str, Match]:
         name: match(subject.q_values(change(observations)), exact)
         for name, change in observation_changes().items()
     }
+
+
+@dataclass(frozen=True)
+class ActionMatch:
+    """The correlation of the torques that an agent chooses with those that its run stored."""
+
+    declared: float  # of the agent as it is
+    torques: Array  # [A]: the torque that the run stored most often where an output is chosen
+    by_torques: float  # with these torques, on transitions that did not choose them
+    observation: str  # the change of the observation that matches best
+    by_observation: float  # with this change
+
+
+def match_actions(measurement: Measurement, replay: Transitions) -> ActionMatch:
+    """Returns the match with the last 1000 stored actions, which a run chooses greedily."""
+    subject = measurement.subject
+    torques = subject.torques
+    assert torques is not None
+    observations, stored = replay.observation[-1000:], replay.action[-1000:]
+
+    def match_torques(changed: Subject) -> float:
+        return line_fit(changed.act(observations), torques[stored]).correlation
+
+    chosen = subject.q_values(observations).argmax(axis=1)
+    counts = np.zeros((len(torques), len(torques)), np.intp)
+    np.add.at(counts, (chosen[::2], stored[::2]), 1)
+    found = np.where(counts.any(axis=1), torques[counts.argmax(axis=1)], torques)
+    by_change = {
+        name: match_torques(subject.with_observations(change))
+        for name, change in observation_changes().items()
+    }
+    best = max(by_change, key=lambda name: by_change[name])
+    return ActionMatch(
+        match_torques(subject),
+        found,
+        line_fit(found[chosen[1::2]], torques[stored[1::2]]).correlation,
+        best,
+        by_change[best],
+    )
+
+
+def stored_errors(measurement: Measurement, record: RunRecord) -> tuple[float, float]:
+    """Returns the errors of the stored actions' values, as shares of the rewards' spread.
+
+    The first error is that to the stored rewards, the second that to the targets of the declared
+    discount.
+    """
+    subject, replay = measurement.subject, record.replay
+    reward = replay.reward / record.config.reward_scale
+    learned = subject.q_values(replay.observation)[np.arange(len(reward)), replay.action]
+    target = reward + subject.discount * subject.q_values(replay.next_observation).max(axis=1)
+    spread = max(float(reward.std()), 1e-9)
+    return (
+        float(np.sqrt(np.mean((learned - reward) ** 2))) / spread,
+        float(np.sqrt(np.mean((learned - target) ** 2))) / spread,
+    )
 
 
 def _match_task(measurement: Measurement, gravity: float, discount: float) -> Match:

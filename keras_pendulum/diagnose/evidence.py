@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from keras_pendulum.diagnose import comparisons
-from keras_pendulum.diagnose.comparisons import Match
+from keras_pendulum.diagnose.comparisons import ActionMatch, Match
 from keras_pendulum.diagnose.measurement import Measurement
 from keras_pendulum.diagnose.repairs import Repair
 from keras_pendulum.diagnose.run_record import RunRecord
@@ -75,9 +75,23 @@ class Evidence:
     def observation(self) -> tuple[str, Match]:
         """The change of the observation that matches best."""
         matches = comparisons.match_observations(self.measurement)
-        # Both signs turned is the reversed torque: the pendulum is symmetric.
-        del matches["cos θ, -sin θ, -θ̇"]
         return max(matches.items(), key=lambda item: item[1].scaled_score)
+
+    @cached_property
+    def actions(self) -> ActionMatch | None:
+        """The match with the stored actions; None without 200 of them."""
+        if self.record is None or len(self.record.replay.action) < 200:
+            return None
+        return comparisons.match_actions(self.measurement, self.record.replay)
+
+    @cached_property
+    def lost_actions(self) -> list[int]:
+        """The actions that acted, but were stored as others; none without 200 transitions."""
+        torques = self.measurement.subject.torques
+        if self.record is None or torques is None or len(self.record.replay.action) < 200:
+            return []
+        lost = self.record.lost_actions(torques)
+        return lost if len(lost) < len(torques) / 2 else []
 
     def repaired(self, name: str, evidence: str, healthy: str, repair: Repair) -> Finding:
         """Returns a finding with what its repair wins."""

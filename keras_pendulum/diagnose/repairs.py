@@ -71,6 +71,12 @@ def repair_torques(measurement: Measurement) -> Repair:
     return play(measurement, "each output with the torque that it behaves like", repaired)
 
 
+def replace_torques(measurement: Measurement, torques: Array) -> Repair:
+    """Plays the agent with other torques for its outputs."""
+    repaired = measurement.subject.with_torques(torques)
+    return play(measurement, "each output with the torque that the run stored for it", repaired)
+
+
 def rescale_torques(measurement: Measurement, factor: float) -> Repair:
     """Plays the agent with its torques multiplied by a factor."""
     torques = measurement.subject.torques

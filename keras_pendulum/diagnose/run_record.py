@@ -77,15 +77,43 @@ class RunRecord:
         Gravity and torque are those with which the equation of motion best leads from each stored
         observation to the next one. The correlation is 1 in a healthy buffer.
         """
-        theta, speed = self.states.T
-        next_speed = self.replay.next_observation[:, 2].astype(np.float64)
-        free = np.abs(next_speed) < MAX_SPEED - 1e-3
-        acceleration = ((next_speed - speed) / TIME_STEP)[free]
-        stored = torques[self.replay.action][free]
-        causes = np.stack([1.5 * np.sin(theta[free]), 3 * stored], axis=1)
+        sine, acceleration, action = self._motion
+        stored = torques[action]
+        causes = np.stack([1.5 * sine, 3 * stored], axis=1)
         (gravity, _), *_ = np.linalg.lstsq(causes, acceleration, rcond=None)
         acted = acceleration - gravity * causes[:, 0]
         return float(gravity), line_fit(acted, stored).correlation
+
+    def lost_actions(self, torques: Array) -> list[int]:
+        """Returns the actions that acted, but were always stored as one other action.
+
+        The equation of motion is exact, so each transition shows which torque acted in it. No
+        action is returned where the torques that acted are not among `torques`.
+        """
+        sine, acceleration, stored = self._motion
+        gravity, _ = self.motion_fit(torques)
+        for _ in range(3):  # a lost action changes the first fit of the gravity a little
+            acted = (acceleration - 1.5 * gravity * sine) / 3
+            nearest = np.abs(acted[:, None] - torques).argmin(axis=1)
+            rest = acceleration - 3 * torques[nearest]
+            gravity = (rest * sine).sum() / max(1.5 * (sine**2).sum(), 1e-9)
+        if (np.abs(acted - torques[nearest]) < 0.01).mean() < 0.95:
+            return []
+        never_stored = set(nearest.tolist()) - set(self.replay.action.tolist())
+        return sorted(
+            action
+            for action in never_stored
+            if (nearest == action).sum() > 1 and np.ptp(stored[nearest == action]) == 0
+        )
+
+    @property
+    def _motion(self) -> tuple[Array, Array, NDArray[np.intp]]:
+        """sin θ, acceleration and stored action of the transitions below the speed limit."""
+        theta, speed = self.states.T
+        next_speed = self.replay.next_observation[:, 2].astype(np.float64)
+        free = np.abs(next_speed) < MAX_SPEED - 1e-3
+        acceleration = (next_speed - speed) / TIME_STEP
+        return np.sin(theta)[free], acceleration[free], self.replay.action[free]
 
     def reward_fit(self, torques: Array) -> tuple[float, float]:
         """Returns correlation and factor between the stored rewards and the exact ones.

@@ -12,6 +12,7 @@ from keras_pendulum.diagnose.evidence import Evidence, Finding
 from keras_pendulum.optimum.dynamics import MAX_SPEED
 
 _SHIPPED_GRAVITIES = (1.0, 10.0)
+_SAME_ACTIONS = 0.8  # correlation of an agent's torques with those that its run stored
 _WORST_REWARD = np.pi**2 + 0.1 * MAX_SPEED**2 + 0.004
 
 
@@ -60,7 +61,17 @@ def reward_sign(e: Evidence) -> Finding | None:
 
 
 def observation_map(e: Evidence) -> Finding | None:
-    """Finds a change of the observation with which the values fit and the policy works."""
+    """Finds a change of the observation with which the agent acts as its run, or as it should."""
+    actions = e.actions
+    if actions is not None:
+        if actions.declared > _SAME_ACTIONS:
+            return None
+        if actions.by_observation > max(_SAME_ACTIONS, actions.declared + 0.3):
+            evidence = "correlation of the torques with those of the run "
+            evidence += f"{actions.declared:.2f}, with the observation [{actions.observation}] "
+            evidence += f"{actions.by_observation:.2f}"
+            repair = repairs.change_observations(e.measurement, actions.observation)
+            return e.repaired("observation-map", evidence, "best as it is", repair)
     name, best = e.observation
     if best.scaled_score < max(0.3, e.declared.scaled_score + 0.2):
         return None
@@ -73,8 +84,23 @@ def observation_map(e: Evidence) -> Finding | None:
 
 
 def torque_map(e: Evidence) -> Finding | None:
-    """Finds torques with which the outputs fit: in another order, or smaller."""
-    m = e.measurement
+    """Finds torques with which the agent acts as its run, or the outputs fit the exact values."""
+    m, actions = e.measurement, e.actions
+    if actions is not None:
+        if actions.declared > _SAME_ACTIONS:
+            return None
+        if actions.by_torques > max(_SAME_ACTIONS, actions.declared + 0.3):
+            return e.repaired(
+                "torque-map",
+                f"correlation of the torques with those of the run {actions.declared:.2f}, with "
+                f"each output in its place {actions.by_torques:.2f}",
+                "the same",
+                repairs.replace_torques(m, actions.torques),
+            )
+    different = np.unique(m.learned_q, axis=1).shape[1]
+    if 1 < different < m.learned_q.shape[1] / 2:
+        evidence = f"{m.learned_q.shape[1]} outputs with {different} different values"
+        return Finding("torque-map", evidence, "all different")
     if m.value.correlation < 0.9 or not 0.5 < m.value.slope < 2:
         return None
     matched = repairs.matched_correlation(m)
@@ -103,6 +129,11 @@ def no_lookahead(e: Evidence) -> Finding | None:
     """Compares with the rewards of one step, in which no torque matters yet."""
     m, rewards = e.measurement, e.rewards
     discount = m.subject.discount
+    if e.record is not None and len(e.record.replay.action) > 0:
+        error, declared = comparisons.stored_errors(m, e.record)
+        if error < min(0.2, 0.3 * declared):
+            evidence = f"values of the stored actions within {error:.0%} of their rewards"
+            return Finding("no-bootstrapping", evidence, f"above {declared:.0%}")
     if rewards.value < 0.99 or rewards.slope <= 0 or m.advantage_size > 0.45:
         return None
     if m.advantage.correlation > 0.6 or rewards.value < m.value.correlation:

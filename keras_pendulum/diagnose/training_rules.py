@@ -24,7 +24,7 @@ def stored_transitions(e: Evidence) -> Finding | None:
         evidence = f"{r.terminal:.0%} of the stored transitions end their episode"
         return Finding("no-bootstrapping", evidence, "none: the pendulum never terminates")
     gravity, torque_correlation = r.motion_fit(torques)
-    if torque_correlation < 0.9:
+    if torque_correlation < 0.9 and not e.lost_actions:
         return Finding(
             "misaligned-transitions",
             f"correlation of the stored action with the torque that acted {torque_correlation:.2f}",
@@ -45,8 +45,15 @@ def stored_transitions(e: Evidence) -> Finding | None:
 
 
 def untrained_outputs(e: Evidence) -> Finding | None:
-    """Finds outputs that are seldom stored, or far from all others."""
-    m = e.measurement
+    """Finds outputs that are stored as others, never stored, or far from all others."""
+    m, lost = e.measurement, e.lost_actions
+    if lost:
+        return e.repaired(
+            "untrained-outputs",
+            f"the outputs {', '.join(map(str, lost))} acted, but were stored as others",
+            "each stored as itself",
+            repairs.mask_outputs(m, lost),
+        )
     if e.record is not None and m.subject.torques is not None:
         counts = e.record.action_counts(len(m.subject.torques))
         missing = np.flatnonzero(counts == 0).tolist()

@@ -80,6 +80,32 @@ def test_actions_that_are_never_stored_are_named(record: RunRecord) -> None:
     assert first(changed(record, **fields)) == "untrained-outputs"
 
 
+def merged(record: RunRecord, action: int) -> RunRecord:
+    stored = record.replay.action
+    return changed(record, action=np.where(stored == action, action + 1, stored))
+
+
+@pytest.mark.parametrize("action", [3, 39])
+def test_action_stored_as_another_is_lost(record: RunRecord, action: int) -> None:
+    assert record.lost_actions(TORQUES) == []
+    assert merged(record, action).lost_actions(TORQUES) == [action]
+    assert first(merged(record, action)) == "untrained-outputs"
+
+
+def test_lost_action_is_proven_in_a_small_buffer_of_one_action(record: RunRecord) -> None:
+    kept = np.flatnonzero(record.replay.action == 39)  # the correlation of a constant is 0
+    kept = np.resize(kept, 300)
+    fields = {name: array[kept] for name, array in record.replay._asdict().items()}
+    assert first(merged(changed(record, **fields), 39)) == "untrained-outputs"
+
+
+@pytest.mark.parametrize("stored", [40, 1000])
+def test_transitions_off_by_one_lose_no_action(record: RunRecord, stored: int) -> None:
+    fields = {name: array[-stored:] for name, array in record.replay._asdict().items()}
+    shifted = changed(record, **{**fields, "action": np.roll(fields["action"], 1)})
+    assert shifted.lost_actions(TORQUES) == []
+
+
 def test_epsilon_that_never_falls_is_named(record: RunRecord) -> None:
     history = [each._replace(epsilon=0.9, updates=9000) for each in record.history]
     assert first(replace(record, history=history)) == "exploration"

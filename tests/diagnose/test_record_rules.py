@@ -1,0 +1,107 @@
+"""Tests of the rules that compare an agent with the record of its run."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from exact_agent import coarse_value, exact_values, subject
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.diagnose import comparisons, measurement
+from keras_pendulum.diagnose.evidence import Evidence
+from keras_pendulum.diagnose.run_record import RunRecord
+from keras_pendulum.diagnose.states import observe, plane_states
+from keras_pendulum.diagnose.task_rules import no_lookahead, observation_map, torque_map
+from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
+
+NOISE = np.random.RandomState(0).normal(size=(3, 41))
+OTHER_NOISE = np.random.RandomState(1).normal(size=(3, 41))
+
+
+@pytest.fixture(autouse=True)
+def _coarse_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measurement, "discounted_value", coarse_value)
+    monkeypatch.setattr(comparisons, "other_value", coarse_value)
+
+
+def untrained(observations: Any) -> Any:
+    """Returns Q-values that show no torque: only the stored actions can."""
+    return np.sin(observations @ NOISE)
+
+
+def record_of(q_values: Any, **settings: Any) -> RunRecord:
+    """Returns the record of a greedy run of the pendulum with g = 1 from random states."""
+    states = plane_states()[:600]
+    observations = observe(states)
+    actions = q_values(observations).argmax(axis=1).astype(np.int32)
+    rows = np.arange(len(actions))
+    reward, theta, speed = step_all_torques(1.0, states[:, 0], states[:, 1], TORQUES)
+    following = np.stack([theta[rows, actions], speed[rows, actions]], axis=1)
+    replay = Transitions(
+        observations, actions, reward[rows, actions], observe(following), np.zeros(600, bool)
+    )
+    return RunRecord(replace(Config(), **settings), [], replay)
+
+
+def evidence(q_values: Any, record: RunRecord | None) -> Evidence:
+    return Evidence(measurement.measure(subject(q_values)), record)
+
+
+@pytest.mark.parametrize(
+    "order",
+    [np.arange(41)[::-1], np.roll(np.arange(41), 20), np.random.RandomState(3).permutation(41)],
+)
+def test_stored_actions_show_the_order_of_the_outputs(order: Any) -> None:
+    found = evidence(lambda o: untrained(o)[:, order], record_of(untrained))
+    finding = torque_map(found)
+    assert finding is not None and finding.evidence.endswith("in its place 1.00")
+    assert finding.repair is not None
+    run = measurement.measure(subject(untrained))
+    assert finding.repair.regret == pytest.approx(run.regret, rel=0.1)
+    assert observation_map(found) is None
+
+
+@pytest.mark.parametrize("signs", [(1, 1, -1), (-1, 1, 1), (1, -1, 1)])
+def test_stored_actions_show_the_changed_observation(signs: Any) -> None:
+    found = evidence(lambda o: untrained(o * np.array(signs)), record_of(untrained))
+    finding = observation_map(found)
+    assert finding is not None and finding.evidence.endswith("1.00")
+    assert torque_map(found) is None
+
+
+@pytest.mark.parametrize("q_values", [untrained, lambda o: np.sin(o @ OTHER_NOISE)])
+def test_agent_that_acts_as_its_run_or_as_no_map_of_it_has_no_map(q_values: Any) -> None:
+    found = evidence(q_values, record_of(untrained))
+    assert torque_map(found) is None and observation_map(found) is None
+
+
+def test_stored_actions_refute_a_torque_map() -> None:
+    def reversed_values(observations: Any) -> Any:
+        return exact_values(observations)[:, ::-1]
+
+    assert torque_map(evidence(reversed_values, None)) is not None
+    assert torque_map(evidence(reversed_values, record_of(reversed_values))) is None
+
+
+def test_equal_outputs_are_a_torque_map() -> None:
+    smaller = 20 + (np.arange(41) - 20) // 4
+    finding = torque_map(evidence(lambda o: untrained(o)[:, smaller], None))
+    assert finding is not None and finding.evidence == "41 outputs with 11 different values"
+    assert torque_map(evidence(untrained, None)) is None
+
+
+def test_rewards_of_the_stored_states_are_no_bootstrapping() -> None:
+    record = record_of(untrained)
+    seen = record.replay.observation[:, 2] > 0.5
+    replay = Transitions(*(array[seen] for array in record.replay))
+
+    def rewards(observations: Any) -> Any:  # wrong where the run has never been
+        wrong = 20 * np.sin(9 * observations @ NOISE) * (observations[:, 2:] < 0)
+        return exact_values(observations, discount=0.0) + wrong
+
+    finding = no_lookahead(evidence(rewards, replace(record, replay=replay)))
+    assert finding is not None and finding.name == "no-bootstrapping"
+    assert no_lookahead(evidence(rewards, None)) is None
+    assert no_lookahead(evidence(exact_values, record)) is None
