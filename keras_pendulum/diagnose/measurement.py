@@ -173,6 +173,17 @@ class Measurement:
         return float(np.median(excess)) / self.value_spread
 
     @cached_property
+    def promise(self) -> float:
+        """The median of the highest learned value minus what the agent collects, in spreads.
+
+        The states are those of the first half of the agent's episodes.
+        """
+        episodes, half = self.episodes, len(self.episodes.rewards) // 2
+        collected = episodes.returns_to_go(self.subject.discount)[:half:5]
+        learned = self.subject.q_values(observe(episodes.states[:half:5].reshape(-1, 2)))
+        return float(np.median(learned.max(axis=1) - collected.ravel())) / self.value_spread
+
+    @cached_property
     def value_spread(self) -> float:
         """The standard deviation of the exact values at `states`."""
         return float(self.exact_q.mean(axis=1).std())

@@ -41,7 +41,14 @@ class Episodes:
 
     def discounted(self, discount: float) -> Array:
         """Returns the discounted sums of the rewards from the first step, [B]."""
-        return np.asarray(discount ** np.arange(len(self.rewards)) @ self.rewards)
+        return np.asarray(self.returns_to_go(discount)[0])
+
+    def returns_to_go(self, discount: float) -> Array:
+        """Returns the discounted sums of the rewards from each step on, [steps, B]."""
+        sums = self.rewards.copy()
+        for step in range(len(sums) - 2, -1, -1):
+            sums[step] += discount * sums[step + 1]
+        return sums
 
 
 def simulate(act: Act, gravity: float, starts: Array, steps: int = STEPS_PER_EPISODE) -> Episodes:

@@ -164,16 +164,20 @@ def saturated_layer(e: Evidence) -> Finding | None:
 
 
 def overestimation(e: Evidence) -> Finding | None:
-    """Finds values above the best possible ones."""
+    """Finds values above the best possible ones, and above what the policy collects."""
     m = e.measurement
     excess = m.excess
     if excess > 3:  # also where nothing else about the values is right
         evidence = f"the highest value is above the best possible by {excess:.1f} spreads"
         return Finding("overestimation", evidence, "0.00 to 0.15")
-    if m.value.correlation > 0.95 and m.value.slope > 0.5 and excess > 0.45:
-        evidence = f"the highest value is above the best possible by {excess:.2f} of the spread; "
-        evidence += f"promised {m.predicted:.1f} from the starts, collected {m.collected:.1f}"
-        return Finding("overestimation", evidence, "0.00 to 0.15")
+    # A policy collects less than its values promise for many reasons. This setting is one of them.
+    caused = e.record is not None and e.record.config.target_update == "none"
+    right = m.value.correlation > 0.9 and m.value.slope > 0.5
+    if right and m.promise > (0.2 if caused else 0.5) and (caused or excess > 0.45):
+        evidence = "the highest value of the visited states is above what the policy collects by "
+        evidence += f"{m.promise:.2f} spreads, above the best possible by {excess:.2f}"
+        evidence += ", after a run without a target network" if caused else ""
+        return Finding("overestimation", evidence, "up to 0.30, both")
     return None
 
 

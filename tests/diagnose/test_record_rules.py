@@ -10,9 +10,11 @@ from exact_agent import coarse_value, exact_values, subject
 from keras_pendulum.config.config import Config
 from keras_pendulum.diagnose import comparisons, measurement
 from keras_pendulum.diagnose.evidence import Evidence
+from keras_pendulum.diagnose.findings import find
 from keras_pendulum.diagnose.run_record import RunRecord
-from keras_pendulum.diagnose.states import observe, plane_states
+from keras_pendulum.diagnose.states import Episodes, observe, plane_states
 from keras_pendulum.diagnose.task_rules import no_lookahead, observation_map, torque_map
+from keras_pendulum.diagnose.training_rules import overestimation
 from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
 
@@ -105,3 +107,31 @@ def test_rewards_of_the_stored_states_are_no_bootstrapping() -> None:
     assert finding is not None and finding.name == "no-bootstrapping"
     assert no_lookahead(evidence(rewards, None)) is None
     assert no_lookahead(evidence(exact_values, record)) is None
+
+
+def test_uncollected_values_without_a_target_network_are_overestimation() -> None:
+    exact = subject(exact_values)
+    weak = replace(exact, act=lambda observations: 0 * exact.act(observations))
+    measured = measurement.measure(weak)
+    assert measured.excess == pytest.approx(0, abs=0.01) and measured.promise > 0.2
+    without = record_of(exact_values, target_update="none")
+    assert overestimation(Evidence(measured, without)) is not None
+    assert overestimation(Evidence(measured, record_of(exact_values))) is None
+    assert overestimation(Evidence(measured)) is None
+    assert overestimation(evidence(exact_values, without)) is None
+
+
+def test_torque_map_explains_values_that_the_policy_does_not_collect() -> None:
+    record = record_of(exact_values, target_update="none")
+    found = evidence(lambda o: exact_values(o)[:, ::-1], record)
+    assert overestimation(found) is not None
+    names = [finding.name for finding in find(found)]
+    assert "torque-map" in names and "overestimation" not in names
+
+
+def test_returns_to_go_are_the_discounted_sums_of_the_rest() -> None:
+    rewards = np.array([[1.0, 0], [2, 0], [4, 8]])
+    episodes = Episodes(np.zeros((3, 2, 2)), np.zeros((3, 2)), rewards)
+    assert episodes.returns_to_go(0.5).tolist() == [[3, 2], [4, 4], [4, 8]]
+    assert episodes.discounted(0.5).tolist() == [3, 2]
+    assert rewards[0, 0] == 1
