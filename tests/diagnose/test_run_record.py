@@ -99,6 +99,21 @@ def test_lost_action_is_proven_in_a_small_buffer_of_one_action(record: RunRecord
     assert first(merged(changed(record, **fields), 39)) == "untrained-outputs"
 
 
+def test_action_stored_as_a_distant_one_is_lost(record: RunRecord) -> None:
+    stored = record.replay.action
+    distant = changed(record, action=np.where(stored == 0, 40, stored))
+    assert abs(distant.motion_fit(TORQUES)[0] - 1) > 0.001
+    assert distant.lost_actions(TORQUES) == [0]
+
+
+def test_torques_between_the_outputs_lose_no_action(record: RunRecord) -> None:
+    kept = record.replay.action < 40
+    fields = {name: array[kept] for name, array in record.replay._asdict().items()}
+    fields["next_observation"] = fields["next_observation"] + np.array([0, 0, 0.01], np.float32)
+    fields["next_observation"][::2, 2] -= 0.02
+    assert changed(record, **fields).lost_actions(TORQUES) == []
+
+
 @pytest.mark.parametrize("stored", [40, 1000])
 def test_transitions_off_by_one_lose_no_action(record: RunRecord, stored: int) -> None:
     fields = {name: array[-stored:] for name, array in record.replay._asdict().items()}
