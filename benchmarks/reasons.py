@@ -36,6 +36,8 @@ REASONS: dict[str, dict[str, str]] = {
         "forgets how the pole falls",
         "reward_scale": "1 - γ: then the values are about as large as one reward, which suits "
         "Adam's step",
+        "epsilon_min": "random actions bring the cart near the ends of its track; without them "
+        "the network does not learn that a slow drift ends there",
         "train_frequency": "one compiled call makes all updates of an episode; without it the "
         "learning rate is constant too",
         "updates_per_episode": "fewer do not suffice for every training seed",
