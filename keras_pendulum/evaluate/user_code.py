@@ -17,20 +17,24 @@ _FORM = re.compile(r"(?P<place>.+\.py|\w+(\.\w+)*):(?P<name>[^\W\d]\w*)", re.DOT
 
 
 def names_code(word: str) -> bool:
-    """Returns whether a word has the form `file.py:name` or `package.module:name`.
+    """Returns whether a word has the form `file.py:name`, `package.module:name` or `file.py`.
 
-    A file of that very name is no code.
+    Another file of that very name is no code.
     """
+    if word.endswith(".py"):
+        return True
     return _FORM.fullmatch(word) is not None and not Path(word).is_file()
 
 
 def load_code(word: str) -> Any:
     """Runs the file, or imports the module, and returns the object of that name.
 
-    Raises UserError when there is no such file, module or name, and when the code fails.
+    Raises UserError when there is no such file, module or name, when the word has no name, and when
+    the code fails.
     """
     form = _FORM.fullmatch(word)
-    assert form, word
+    if form is None:
+        raise UserError(f"{word}: names a file, but no agent in it; expected {word}:NAME")
     place, name = form["place"], form["name"]
     # The code may import what lies beside it, as it may when Python runs it.
     folder = str(Path(place).parent.resolve() if place.endswith(".py") else Path.cwd())

@@ -64,6 +64,7 @@ def test_other_objects_in_a_file_are_evaluated(in_process: Command, code: Path) 
 
 WRONG = [
     (["my agent.py:pusch"], "my agent.py: has no pusch; did you mean push?"),
+    (["my agent.py"], "my agent.py: names a file, but no agent in it; expected my agent.py:NAME"),
     (["missing.py:push"], "missing.py: no such file; expected FILE.py:NAME"),
     (["missing27.agents:push"], "missing27.agents: no such module; expected PACKAGE.MODULE:NAME"),
     (["my agent.py:number"], "my agent.py:number: agent is 3; expected a DQN"),
@@ -105,7 +106,7 @@ def test_wrong_agent_is_one_line(
         ("reference", False),
         ("run/weights.h5", False),
         ("C:\\folder\\weights.h5", False),
-        ("a.py", False),
+        ("a.py", True),
         ("a.py:2", False),
         ("a b:c", False),
     ],
