@@ -29,6 +29,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "cost of a study": study_blocks.study_cost,
     "limits of a study": study_blocks.study_scale,
     "last regret": lambda: markdown(rows_of(code_blocks.LAST_REGRET)),
+    "last regret of swingup": lambda: markdown(rows_of("last_regret_swingup")),
     "shares of the last regret": code_blocks.last_regret_shares,
     "recorded runs": code_blocks.recorded_runs,
     "recorded run of CartPole": lambda: markdown(rows_of("recorded_cartpole")),

@@ -73,6 +73,7 @@ def _draw_seeds(
     level = discount_alone.lost.sum(axis=0).mean()
     axes.axhline(level, color="black", linestyle="--", label="the discount alone")
     axes.set(title="By training seed", xlabel="Training seed", ylabel="Mean regret")
+    axes.set_xticks(100 + np.arange(len(regrets)))
     axes.set_ylim(top=1.35 * axes.get_ylim()[1])  # room for the legend above the bars
     axes.legend(loc="upper left")
 

@@ -17,7 +17,7 @@ commands write them:
     python -m keras_pendulum.optimum 1 --discount 0.9 --out keras_pendulum/optimum/data
     python -m keras_pendulum.optimum 1 --discount 0.9 --steps 100 --out keras_pendulum/optimum/data
     python -m keras_pendulum.optimum 10 --discount 0.98 --out keras_pendulum/optimum/data
-    python -m keras_pendulum.optimum 10 --discount 0.98 --steps 60 --out keras_pendulum/optimum/data
+    python -m keras_pendulum.optimum 10 --discount 0.98 --steps 30 --out keras_pendulum/optimum/data
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from figure_texts import figure_of, require_legible
 
 from benchmarks.last_regret import Episodes
@@ -16,8 +17,9 @@ def make_episodes(seed: int) -> Episodes:
     return Episodes(3 * theta, 7 * speed, np.abs(lost), *others)
 
 
-def test_no_text_overlaps_another_or_leaves_the_picture() -> None:
-    runs = {name: [make_episodes(i) for i in range(8)] for name in ("before", "reference")}
+@pytest.mark.parametrize("seeds", [2, 8])
+def test_no_text_overlaps_another_or_leaves_the_picture(seeds: int) -> None:
+    runs = {name: [make_episodes(i) for i in range(seeds)] for name in ("before", "reference")}
     value = -np.ones((3201, 41), np.float32)
     figure = figure_of(lambda: draw("reference", 1.0, runs, make_episodes(9), value))
     require_legible(figure)

@@ -114,7 +114,9 @@ WORSE = [
     (
         kp.preset("swingup", episodes=60),  # fewer updates an episode than reference, but shorter
         record(59, 570),
-        "It had 60 episodes; the preset swingup has 1700: continue with --resume --episodes 1700",
+        "It had 60 episodes; the preset swingup has "
+        f"{kp.preset('swingup').episodes}: continue with --resume --episodes "
+        f"{kp.preset('swingup').episodes}",
     ),
     (
         kp.preset("reference", learning_rate_schedule="constant"),
