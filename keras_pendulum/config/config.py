@@ -48,8 +48,9 @@ class Config:
     initial_weights: str = setting(
         "glorot",
         "glorot: uniform, by inputs and outputs, biases 0 (Keras's default); fan-in: uniform "
-        "within ±1/√inputs, biases too (PyTorch's default)",
-        Text(("glorot", "fan-in")),
+        "within ±1/√inputs, biases too (PyTorch's default); spread: glorot, but fan-in kernel in "
+        "the first layer and hidden biases within ±0.3, so that the units differ more",
+        Text(("glorot", "fan-in", "spread")),
     )
     torque_count: int = setting(
         41, "torques of the pendulum, linspace(-2, 2, torque_count) N·m", Integer(2, 1001)

@@ -13,6 +13,7 @@ import keras
 from keras_pendulum.dqn.policy import activations_of
 
 REGISTERED_NAME = "keras_pendulum>DQN"  # in the files of Keras
+_SPREAD = 0.3  # limit of the hidden biases of `spread`
 _DTYPE = "float32"  # also where the user's keras.json names another one
 
 
@@ -32,8 +33,9 @@ class DQN(keras.Model):
     """Dense layers with an activation, then a linear output for each action.
 
     `activation` is one name for all hidden layers, or one for each, separated by commas. The
-    constructor builds the weights. They depend on `seed` alone: `glorot` is uniform within
-    ±√(6 / (inputs + outputs)) with biases 0, `fan-in` is uniform within ±1/√inputs, biases too.
+    constructor builds the weights. They depend on `seed` alone and are uniform: `glorot` within
+    ±√(6 / (inputs + outputs)), with biases 0; `fan-in` within ±1/√inputs, biases too; `spread` as
+    `glorot`, but within ±1/√inputs in the first layer, and with hidden biases within ±0.3.
     """
 
     def __init__(
@@ -57,11 +59,18 @@ class DQN(keras.Model):
 
         def dense(name: str, inputs: int, units: int, activation: str | None) -> keras.layers.Dense:
             layer = partial(keras.layers.Dense, units, activation, name=name, dtype=_DTYPE)
-            if initial_weights == "glorot":
-                return layer(kernel_initializer=keras.initializers.GlorotUniform(seed=seeds))
-            limit = inputs**-0.5
-            uniform = keras.initializers.RandomUniform(-limit, limit, seed=seeds)
-            return layer(kernel_initializer=uniform, bias_initializer=uniform)
+
+            def uniform(limit: float) -> keras.initializers.Initializer:
+                return keras.initializers.RandomUniform(-limit, limit, seed=seeds)
+
+            fan_in = uniform(inputs**-0.5)
+            if initial_weights == "fan-in":
+                return layer(kernel_initializer=fan_in, bias_initializer=fan_in)
+            glorot = keras.initializers.GlorotUniform(seed=seeds)
+            if initial_weights == "glorot" or name == "head":
+                return layer(kernel_initializer=glorot)
+            kernel = fan_in if name == "hidden_0" else glorot
+            return layer(kernel_initializer=kernel, bias_initializer=uniform(_SPREAD))
 
         widths = (observation_size, *hidden_units)
         names = activations_of(activation, len(self.hidden_units))

@@ -50,6 +50,7 @@ def make_run(config: Config, initial: DQN | None = None, render: bool = False) -
     task = TASKS[config.environment]
     streams = RandomStreams(config.seed)
     actions = make_actions(config.environment, config.torque_count, config.stored_index)
+    settings = json.dumps(asdict(config))
     online = DQN(
         config.hidden_units,
         actions.count,
@@ -58,11 +59,7 @@ def make_run(config: Config, initial: DQN | None = None, render: bool = False) -
         initial_weights=config.initial_weights,
         seed=config.seed,
         provenance=Provenance(
-            config.environment,
-            config.gravity,
-            config.preset,
-            config.seed,
-            json.dumps(asdict(config)),
+            config.environment, config.gravity, config.preset, config.seed, settings
         ),
     )
     if initial is not None:
@@ -70,24 +67,18 @@ def make_run(config: Config, initial: DQN | None = None, render: bool = False) -
     target, update_target = make_target(online, config)
     mode = "human" if render else None
     env = make_environment(config.environment, config.gravity, mode, config.max_episode_steps)
-    return Run(
-        config,
-        env,
-        actions,
-        Agent(
-            online,
-            target,
-            update_target,
-            make_optimizer(config),
-            {"squared": mean_squared_error, "huber": huber}[config.loss],
-            config.discount,
-            config.double_q,
-            streams.exploration,
-        ),
-        ReplayBuffer(config.replay_capacity, task.observation_size),
-        make_schedule(config),
-        streams,
+    agent = Agent(
+        online,
+        target,
+        update_target,
+        make_optimizer(config),
+        {"squared": mean_squared_error, "huber": huber}[config.loss],
+        config.discount,
+        config.double_q,
+        streams.exploration,
     )
+    replay = ReplayBuffer(config.replay_capacity, task.observation_size)
+    return Run(config, env, actions, agent, replay, make_schedule(config), streams)
 
 
 def make_optimizer(config: Config) -> keras.optimizers.Optimizer:

@@ -41,7 +41,7 @@ def test_q_values_are_those_computed_by_hand(
     np.testing.assert_allclose(network(np.array([[2, 9, -1]], np.float32)), expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("initial_weights", ["glorot", "fan-in"])
+@pytest.mark.parametrize("initial_weights", ["glorot", "fan-in", "spread"])
 def test_initial_weights_depend_on_the_seed_alone(initial_weights: str) -> None:
     first = DQN((8, 8), seed=3, initial_weights=initial_weights)
     keras.utils.set_random_seed(77)
@@ -76,6 +76,21 @@ def test_fan_in_weights_and_biases_are_uniform() -> None:
             assert -limit * (1 + 1e-6) <= array.min() < -reached * limit
             assert reached * limit < array.max() <= limit * (1 + 1e-6)
         assert kernel.std() == pytest.approx(limit / np.sqrt(3), rel=0.05)
+
+
+def test_spread_weights_differ_from_glorot_in_the_first_kernel_and_the_hidden_biases() -> None:
+    weights = DQN((400, 300), initial_weights="spread").get_weights()
+    # 1/√3, then √(6 / (inputs + outputs)).
+    limits = [0.5773503, 0.0925820, 0.1326470]
+    for limit, kernel in zip(limits, weights[::2], strict=True):
+        assert 0.99 * limit < abs(kernel).max() <= limit * (1 + 1e-6)
+        assert kernel.std() == pytest.approx(limit / np.sqrt(3), rel=0.05)
+    *hidden, head = weights[1::2]
+    for bias in hidden:
+        assert 0.29 < bias.max() < 0.3001
+        assert -0.3001 < bias.min() < -0.29
+        assert bias.std() == pytest.approx(0.3 / np.sqrt(3), rel=0.1)
+    assert not head.any()
 
 
 def test_kernels_of_one_network_differ() -> None:
