@@ -22,6 +22,7 @@ REASONS: dict[str, dict[str, str]] = {
         "episodes": "shorter episodes, so more of them",
         "max_episode_steps": "most regret arises in the first 20 steps; so many longer "
         "episodes take more time",
+        "initial_weights": "more and sharper features near hanging, where a wrong side costs most",
         "replay_capacity": "a swing-up is longer, so more of its transitions are kept",
         "batch_size": "smaller gradient noise, where returns differ by hundreds; its effect "
         "depends on the processor",
@@ -29,7 +30,7 @@ REASONS: dict[str, dict[str, str]] = {
         "the top",
         "reward_scale": "about 1 - γ: then the values are about as large as one reward, which "
         "suits Adam's step",
-        "epsilon_decay": "exploration lasts for the same share of the longer run",
+        "epsilon_decay": "exploration lasts longer, because the run has more episodes",
         "updates_per_episode": "as many after such short episodes would take twice the time",
     },
     "cartpole": {

@@ -39,12 +39,13 @@ _SWINGUP = replace(
     episodes=3400,
     # Most regret arises in the first 20 steps (docs/last_regret.md).
     max_episode_steps=30,
+    initial_weights="spread",
     replay_capacity=25_000,
     batch_size=64,
     discount=0.98,
     reward_scale=0.02,
-    epsilon_decay=0.9985,
-    updates_per_episode=16,
+    epsilon_decay=0.997,
+    updates_per_episode=15,
 )
 
 # The agent of the two PyTorch notebooks, with their numbers.

@@ -75,9 +75,10 @@ def test_swingup_has_the_numbers_of_the_standard_task() -> None:
     assert (config.torque_count, config.stored_index) == (41, "exact")
     assert (config.replay_capacity, config.batch_size) == (25_000, 64)
     assert (config.discount, config.reward_scale, config.double_q) == (0.98, 0.02, False)
-    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.9985, 0.01)
-    assert (config.warmup_episodes, config.updates_per_episode) == (41, 16)
-    assert (config.train_frequency, config.total_updates) == ("episode", 53_744)
+    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.997, 0.01)
+    assert (config.warmup_episodes, config.updates_per_episode) == (41, 15)
+    assert (config.train_frequency, config.total_updates) == ("episode", 50_385)
+    assert config.initial_weights == "spread"
     assert (config.optimizer, config.optimizer_epsilon, config.loss) == ("adam", 1e-7, "squared")
     assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "cosine")
     assert (config.target_update, config.tau) == ("soft", 0.1)
