@@ -43,8 +43,7 @@ ARMS = {
         "reference: reference",
     ],
     "swingup": [
-        "before: swingup episodes=1700 max_episode_steps=60 updates_per_episode=30 "
-        "epsilon_decay=0.997",
+        "before: swingup initial_weights=glorot epsilon_decay=0.9985 updates_per_episode=16",
         "swingup: swingup",
     ],
 }
