@@ -96,8 +96,8 @@ def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(
     assert floor(-5) == -5
     assert floor(-13.2) == -20
     assert floor(-0.013) == pytest.approx(-0.02)
-    assert floor(-1.1, -5) == -5  # fills a fifth of the axis
-    assert floor(-0.9, -5) == -1
+    assert floor(-0.51, -5) == -5  # fills a tenth of the axis
+    assert floor(-0.49, -5) == -0.5
     assert floor(-5.1, -5) == -10
     assert floor(0) == pytest.approx(-0.001)  # equal values need an axis too
 

@@ -2,12 +2,12 @@
 
 /**
  * Returns a round lower end of the axis of the Q-values below the best one, of which `lowest` is the
- * lowest. The end `before` stays as long as the values fill a fifth of the axis: the Q-values of a
- * state differ much less than those of different states, so the axis moves a few times an episode.
+ * lowest. The end `before` stays as long as the values fill a tenth of the axis: a policy that balances
+ * may alternate between states with small and large differences, and the axis must not follow.
  */
 function steadyFloor(lowest, before) {
   const span = Math.max(-lowest, 1e-3);
-  if (before && span <= -before && 5 * span >= -before) return before;
+  if (before && span <= -before && 10 * span >= -before) return before;
   const power = 10 ** Math.floor(Math.log10(span));
   return -power * [1, 2, 5, 10].find((factor) => factor * power >= span * 0.999999);
 }
