@@ -31,7 +31,8 @@ REASONS: dict[str, dict[str, str]] = {
         "reward_scale": "about 1 - γ: then the values are about as large as one reward, which "
         "suits Adam's step",
         "epsilon_decay": "exploration lasts longer, because the run has more episodes",
-        "updates_per_episode": "as many after such short episodes would take twice the time",
+        "updates_per_episode": "as many after such short episodes would take more than twice "
+        "the time",
     },
     "cartpole": {
         "replay_capacity": "the whole run: without the early falls in the buffer, the network "

@@ -33,9 +33,9 @@ class DQN(keras.Model):
     """Dense layers with an activation, then a linear output for each action.
 
     `activation` is one name for all hidden layers, or one for each, separated by commas. The
-    constructor builds the weights. They depend on `seed` alone and are uniform: `glorot` within
-    ±√(6 / (inputs + outputs)), with biases 0; `fan-in` within ±1/√inputs, biases too; `spread` as
-    `glorot`, but within ±1/√inputs in the first layer, and with hidden biases within ±0.3.
+    constructor builds the weights. They depend on `seed` alone and are uniform. `glorot`: within
+    ±√(6 / (inputs + outputs)), biases 0. `fan-in`: within ±1/√inputs, biases too. `spread`: as
+    `glorot`, but the first kernel within ±1/√inputs and the hidden biases within ±0.3.
     """
 
     def __init__(
