@@ -43,7 +43,8 @@ ARMS = {
         "reference: reference",
     ],
     "swingup": [
-        "before: swingup initial_weights=glorot epsilon_decay=0.9985 updates_per_episode=16",
+        "before: swingup replay_capacity=25000 discount=0.98 epsilon_min=0.01 "
+        "updates_per_episode=15 learning_rate_min=0 average_updates=1",
         "swingup: swingup",
     ],
 }

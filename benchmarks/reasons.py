@@ -23,7 +23,6 @@ REASONS: dict[str, dict[str, str]] = {
         "max_episode_steps": "most regret arises in the first 20 steps; so many longer "
         "episodes take more time",
         "initial_weights": "more and sharper features near hanging, where a wrong side costs most",
-        "replay_capacity": "a swing-up is longer, so more of its transitions are kept",
         "batch_size": "smaller gradient noise, where returns differ by hundreds; its effect "
         "depends on the processor",
         "discount": "the γ of `reference` does not look far enough ahead to reach from a swing to "
@@ -31,8 +30,13 @@ REASONS: dict[str, dict[str, str]] = {
         "reward_scale": "about 1 - γ: then the values are about as large as one reward, which "
         "suits Adam's step",
         "epsilon_decay": "exploration lasts longer, because the run has more episodes",
+        "epsilon_min": "at the end the buffer then holds only what the policy meets; the network "
+        "fits that more closely",
         "updates_per_episode": "as many after such short episodes would take more than twice "
         "the time",
+        "learning_rate_min": "weights that still move a little have a better average",
+        "average_updates": "the values change with each update, by more than the difference of two "
+        "torques near hanging; their average does not",
     },
     "cartpole": {
         "replay_capacity": "the whole run: without the early falls in the buffer, the network "

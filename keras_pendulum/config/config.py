@@ -122,8 +122,17 @@ class Config:
     learning_rate: float = setting(1e-3, "initial learning rate", Number(1e-9, 10))
     learning_rate_schedule: str = setting(
         "cosine",
-        "constant; cosine: falls to 0 at the last update",
+        "constant; cosine: falls to learning_rate_min at the last update",
         Text(("constant", "cosine")),
+    )
+    learning_rate_min: float = setting(
+        0.0, "learning rate of the last update (learning_rate_schedule cosine)", Number(0, 10)
+    )
+    average_updates: int = setting(
+        1,
+        "updates over which the final weights are averaged: a moving average, use_ema of Keras "
+        "(Polyak & Juditsky 1992); 1: the weights of the last update",
+        Integer(1, 1_000_000),
     )
     target_update: str = setting(
         "soft",
@@ -177,6 +186,11 @@ class Config:
             raise ConfigError(
                 "learning_rate_schedule cosine needs train_frequency episode: with step the number "
                 "of updates is not known before the run"
+            )
+        if self.learning_rate_min > self.learning_rate:
+            raise ConfigError(
+                f"learning_rate_min {self.learning_rate_min} is larger than learning_rate "
+                f"{self.learning_rate}: make it smaller"
             )
         stored = self.replay_capacity
         if TASKS[self.environment].never_terminates and self.train_frequency == "episode":
@@ -239,6 +253,7 @@ class Config:
         widths = (task.observation_size, *self.hidden_units, outputs)
         weights = sum((inputs + 1) * units for inputs, units in pairwise(widths))
         copies = 4 if self.optimizer == "adam" else 5  # online, target, and the optimizer's moments
+        copies += self.average_updates > 1
         transition = 8 * task.observation_size + 9  # bytes
         size = 4 * copies * weights + self.replay_capacity * transition + 64 * self.episodes
         size += 16 * (self.episodes // self.evaluate_every) if self.evaluate_every else 0

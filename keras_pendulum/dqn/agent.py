@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import keras
@@ -19,41 +20,23 @@ from keras_pendulum.dqn.target_network import TargetUpdate
 Variables = dict[str, NDArray[Any]]  # values by the variables' paths
 
 
+@dataclass(eq=False)
 class Agent:
-    """ε-greedy behaviour policy and the update of Mnih et al. 2015.
+    """ε-greedy behaviour policy and the update of Mnih et al. 2015."""
 
-    Args:
-        online: the network that acts and learns.
-        target: the network that values the next observations.
-        update_target: changes `target` after each gradient step.
-        optimizer: a Keras optimizer for `online`.
-        loss: a scalar from Q-values [B, A], actions [B] and TD targets [B].
-        discount: γ.
-        double_q: true where `online` chooses the next action that `target` values.
-        rng: random-number generator of the exploration.
-    """
+    online: DQN  # the network that acts and learns
+    target: DQN  # the network that values the next observations
+    update_target: TargetUpdate  # changes `target` after each gradient step
+    optimizer: keras.optimizers.Optimizer  # for `online`
+    # Returns a scalar from Q-values [B, A], actions [B] and TD targets [B].
+    loss: Callable[[tf.Tensor, tf.Tensor, tf.Tensor], tf.Tensor]
+    discount: float  # γ
+    double_q: bool  # true where `online` chooses the next action that `target` values
+    rng: np.random.RandomState  # random-number generator of the exploration
 
-    def __init__(
-        self,
-        online: DQN,
-        target: DQN,
-        update_target: TargetUpdate,
-        optimizer: keras.optimizers.Optimizer,
-        loss: Callable[[tf.Tensor, tf.Tensor, tf.Tensor], tf.Tensor],
-        discount: float,
-        double_q: bool,
-        rng: np.random.RandomState,
-    ) -> None:
-        self.online = online
-        self.target = target
-        self.update_target = update_target
-        self.optimizer = optimizer
-        self.loss = loss
-        self.discount = discount
-        self.double_q = double_q
-        self.rng = rng
-        self.policy = greedy_policy(online)
-        optimizer.build(online.trainable_variables)
+    def __post_init__(self) -> None:
+        self.policy = greedy_policy(self.online)
+        self.optimizer.build(self.online.trainable_variables)
         self._compiled: dict[tuple[int, ...], Callable[..., Any]] = {}  # by the batches' shape
         # Called before a compilation, which takes about a second.
         self.on_compile: Callable[[], object] = lambda: None
@@ -103,6 +86,12 @@ class Agent:
         self.optimizer.apply_gradients(zip(gradients, variables, strict=True))
         self.update_target(self.online, self.target, self.optimizer.iterations)
         return loss
+
+    def average_weights(self) -> None:
+        """Replaces the online weights by their moving average, if the optimizer has one."""
+        if self.optimizer.iterations > 0:  # the average begins with the first update
+            self.optimizer.finalize_variable_values(self.online.trainable_variables)
+            self.policy = greedy_policy(self.online)
 
     def get_state(self) -> dict[str, Variables]:
         """Returns copies of the variables of `target` and `optimizer`, by their paths.

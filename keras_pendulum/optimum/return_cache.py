@@ -87,7 +87,7 @@ def cache_folder() -> Path | None:
 
 def file_name(gravity: float, steps: int, discount: float = 1.0) -> str:
     """Returns a name such as `gravity_10.npz`, `gravity_10_steps_30.npz` or
-    `gravity_10_discount_0.98.npz`.
+    `gravity_10_discount_0.985.npz`.
     """
     name = f"gravity_{str(gravity).removesuffix('.0')}"
     name += "" if steps == STEPS_PER_EPISODE else f"_steps_{steps}"

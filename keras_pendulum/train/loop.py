@@ -20,6 +20,8 @@ def train_episodes(run: Run) -> Iterator[EpisodeRecord]:
     """
     for episode in range(len(run.history), run.config.episodes):
         record = _train_episode(run, episode)
+        if episode + 1 == run.config.episodes:
+            run.agent.average_weights()
         run.history.append(record)
         yield record
 

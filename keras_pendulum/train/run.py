@@ -83,15 +83,18 @@ def make_run(config: Config, initial: DQN | None = None, render: bool = False) -
 
 def make_optimizer(config: Config) -> keras.optimizers.Optimizer:
     """Returns Adam (Kingma & Ba 2015), or AdamW with AMSGrad."""
-    learning_rate: float | keras.optimizers.schedules.LearningRateSchedule = config.learning_rate
+    learning_rate: Any = config.learning_rate
     if config.learning_rate_schedule == "cosine":
+        lowest = config.learning_rate_min / config.learning_rate
         learning_rate = keras.optimizers.schedules.CosineDecay(
-            config.learning_rate, max(1, config.total_updates)
+            config.learning_rate, max(1, config.total_updates), alpha=lowest
         )
     # With a fixed name, the variables have the same paths in every process.
     settings: dict[str, Any] = {
         "epsilon": config.optimizer_epsilon,
         "clipvalue": config.gradient_clip,
+        "use_ema": config.average_updates > 1,
+        "ema_momentum": 1 - 1 / config.average_updates,
         "name": config.optimizer,
     }
     if config.optimizer == "adam":

@@ -35,6 +35,8 @@ LIMITS: dict[str, tuple[float, float]] = {
     "weight_decay": (0, 1),
     "gradient_clip": (1e-9, 1e9),
     "learning_rate": (1e-9, 10),
+    "learning_rate_min": (0, 10),
+    "average_updates": (1, 1_000_000),
     "tau": (0, 1),
     "target_period": (1, 1_000_000),
     "save_every": (1, 1_000_000),
@@ -172,6 +174,7 @@ def test_largest_checkpoint_is_accepted_and_a_larger_one_is_refused() -> None:
         {"episodes": 363},
         {"torque_count": 42},
         {"optimizer": "adamw"},
+        {"average_updates": 2},
     ]
     for changes in larger:
         with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
@@ -283,6 +286,11 @@ def test_total_updates_without_warmup_counts_every_episode() -> None:
             "learning_rate_schedule cosine needs train_frequency",
         ),
         ("reference", {"gravity": None}, "gravity is missing; Pendulum-v1 needs it"),
+        (
+            "reference",
+            {"learning_rate_min": 0.1},
+            "learning_rate_min 0.1 is larger than learning_rate 0.001: make it smaller",
+        ),
         (
             "reference",
             {"episodes": 9, "evaluate_every": 10},

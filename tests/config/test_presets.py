@@ -64,6 +64,7 @@ def test_reference_has_its_numbers() -> None:
     assert (config.optimizer, config.optimizer_epsilon, config.loss) == ("adam", 1e-7, "squared")
     assert (config.weight_decay, config.gradient_clip) == (0.0, None)
     assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "cosine")
+    assert (config.learning_rate_min, config.average_updates) == (0.0, 1)
     assert (config.target_update, config.tau, config.save_every) == ("soft", 0.1, 10)
 
 
@@ -73,14 +74,15 @@ def test_swingup_has_the_numbers_of_the_standard_task() -> None:
     assert (config.episodes, config.max_episode_steps) == (3400, 30)
     assert (config.hidden_units, config.activation) == ((512, 256, 128), "tanh")
     assert (config.torque_count, config.stored_index) == (41, "exact")
-    assert (config.replay_capacity, config.batch_size) == (25_000, 64)
-    assert (config.discount, config.reward_scale, config.double_q) == (0.98, 0.02, False)
-    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.997, 0.01)
-    assert (config.warmup_episodes, config.updates_per_episode) == (41, 15)
-    assert (config.train_frequency, config.total_updates) == ("episode", 50_385)
+    assert (config.replay_capacity, config.batch_size) == (14_000, 64)
+    assert (config.discount, config.reward_scale, config.double_q) == (0.985, 0.02, False)
+    assert (config.epsilon_start, config.epsilon_decay, config.epsilon_min) == (0.9, 0.997, 0.0)
+    assert (config.warmup_episodes, config.updates_per_episode) == (41, 14)
+    assert (config.train_frequency, config.total_updates) == ("episode", 47_026)
     assert config.initial_weights == "spread"
     assert (config.optimizer, config.optimizer_epsilon, config.loss) == ("adam", 1e-7, "squared")
     assert (config.learning_rate, config.learning_rate_schedule) == (1e-3, "cosine")
+    assert (config.learning_rate_min, config.average_updates) == (5e-5, 1500)
     assert (config.target_update, config.tau) == ("soft", 0.1)
 
 

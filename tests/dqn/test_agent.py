@@ -333,3 +333,43 @@ def test_set_state_refuses_weights_of_other_layers_and_changes_nothing(wrong: st
     with pytest.raises(ValueError):
         agent.set_state(weights, state)
     assert_equal(values(agent), before)
+
+
+def averaging_agent() -> Agent:
+    """Returns an agent whose optimizer halves the weight of the past at each update."""
+    return make_agent(
+        optimizer=keras.optimizers.Adam(0.01, name="adam", use_ema=True, ema_momentum=0.5)
+    )
+
+
+def test_average_weights_sets_the_moving_average_of_the_updates() -> None:
+    agent = averaging_agent()
+    batches = random_batches(3)
+    expected: Weights = []
+    for k in range(3):
+        agent.update(Transitions(*(field[k : k + 1] for field in batches)))
+        weights = agent.online.get_weights()
+        pairs = zip(expected or weights, weights, strict=True)
+        expected = [(before + now) / 2 for before, now in pairs]
+    assert any((now != mean).any() for now, mean in zip(weights, expected, strict=True))
+    agent.average_weights()
+    for found, mean in zip(agent.online.get_weights(), expected, strict=True):
+        np.testing.assert_allclose(found, mean, atol=1e-7)
+    q = agent.online(OBSERVATION[np.newaxis]).numpy()[0]
+    np.testing.assert_allclose(agent.policy.q_values(OBSERVATION), q, atol=1e-6)
+
+
+@pytest.mark.parametrize("make", [make_agent, averaging_agent])
+def test_average_weights_changes_nothing_before_the_first_update(make: Callable[[], Agent]) -> None:
+    agent = make()
+    before = values(agent)
+    agent.average_weights()
+    assert_equal(values(agent), before)
+
+
+def test_average_weights_changes_nothing_without_an_average() -> None:
+    agent = make_agent()
+    agent.update(random_batches(2))
+    before = values(agent)
+    agent.average_weights()
+    assert_equal(values(agent), before)

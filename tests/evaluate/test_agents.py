@@ -237,7 +237,7 @@ def test_torques_stand_for_the_outputs(network: kp.DQN) -> None:
 
 
 def test_known_discount_is_that_of_the_run_or_of_stable_baselines3(network: kp.DQN) -> None:
-    assert as_agent("swingup").discount == 0.98
+    assert as_agent("swingup").discount == 0.985
     assert as_agent(Predicts(network)).discount == 0.97
     assert as_agent(network).discount is None
     for config in (None, "", "{", "[]", "{}", '{"discount": 2}', '{"discount": "x"}', "[" * 10**5):

@@ -26,7 +26,7 @@ MEASURED = re.compile(
 # Versions, settings, limits in the code, and the 95 % of an interval.
 CONSTANTS = {
     *("3.11", "3.12", "3.13", "3.14", "2.21", "2.15", "2.16", "0.1", "95"),  # versions, interval
-    *("0.9", "0.98", "0.01", "0.004", "1e-7"),  # discounts, ε, weight decays
+    *("0.9", "0.98", "0.985", "0.01", "0.004", "1e-7"),  # discounts, ε, weight decays
     *("2.5", "0.0", "0.00"),  # an error message, and a regret below zero
     *("1", "1.0", "1.00", "0.3", "0.35", "0.8", "0.85", "0.97", "0.99"),  # rules of diagnose
     *("2", "8", "32", "48", "4.5", "4"),  # docs/files.md and docs/scaling.md: limits, sizes

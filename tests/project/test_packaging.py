@@ -88,7 +88,7 @@ def test_wheel_contains_package_data_and_weights_only(built: Built) -> None:
         "keras_pendulum/optimum/data/gravity_1.npz",
         "keras_pendulum/optimum/data/gravity_1_discount_0.9.npz",
         "keras_pendulum/optimum/data/gravity_10.npz",
-        "keras_pendulum/optimum/data/gravity_10_discount_0.98.npz",
+        "keras_pendulum/optimum/data/gravity_10_discount_0.985.npz",
         "keras_pendulum/optimum/data/gravity_1_steps_100.npz",
         "keras_pendulum/optimum/data/gravity_10_steps_30.npz",
         "keras_pendulum/optimum/data/gravity_1_steps_100_discount_0.9.npz",

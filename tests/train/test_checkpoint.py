@@ -28,10 +28,16 @@ from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import make_run
 
 
-@pytest.mark.parametrize("name", ["original", "reference", "cartpole-original"])
-def test_resumed_run_equals_an_uninterrupted_run(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "average_updates"),
+    [("original", 1), ("reference", 1), ("reference", 100), ("cartpole-original", 1)],
+)
+def test_resumed_run_equals_an_uninterrupted_run(
+    name: str, average_updates: int, tmp_path: Path
+) -> None:
     # A small replay buffer, so that old transitions are replaced during the run.
-    config = kp.preset(name, episodes=50, replay_capacity=300 if "cartpole" in name else 3000)
+    size = 300 if "cartpole" in name else 3000
+    config = kp.preset(name, episodes=50, replay_capacity=size, average_updates=average_updates)
     uninterrupted = kp.train_dqn(config, tmp_path / "uninterrupted")
     assert uninterrupted.history[-1].environment_steps > config.replay_capacity
     for last in (5, 45):
@@ -94,6 +100,14 @@ def test_finished_run_can_be_extended(tmp_path: Path) -> None:
     assert_same(kp.train_dqn(longer, tmp_path, resume=True), kp.train_dqn(longer))
 
 
+def test_extended_run_continues_from_the_averaged_weights(tmp_path: Path) -> None:
+    config = kp.preset("original", hidden_units=(8,), episodes=44, average_updates=3)
+    averaged = kp.train_dqn(config, tmp_path).network.get_weights()
+    run = load_checkpoint(tmp_path / "pendulum_weight.h5", replace(config, episodes=48))
+    for found, expected in zip(run.agent.online.get_weights(), averaged, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
 def test_learning_rate_of_an_extended_run_follows_the_longer_cosine(tmp_path: Path) -> None:
     config = kp.preset("reference", hidden_units=(8,), episodes=44)
     before = kp.train_dqn(config, tmp_path).network.get_weights()
@@ -142,6 +156,8 @@ OTHER_VALUES: dict[str, Any] = {
     "gradient_clip": 100.0,
     "learning_rate": 2e-3,
     "learning_rate_schedule": "cosine",
+    "learning_rate_min": 1e-4,
+    "average_updates": 9,
     "target_update": "soft",
     "tau": 0.2,
     "target_period": 199,

@@ -267,3 +267,24 @@ def test_number_that_is_not_finite_stops_the_run_at_its_step(
         list(train_episodes(run))
     assert len(run.history) == 3
     assert run.replay.added == last - 1
+
+
+def test_last_episode_replaces_the_weights_by_their_average() -> None:
+    run = make_run(
+        kp.preset(
+            "reference", hidden_units=(8,), episodes=43, updates_per_episode=2, average_updates=4
+        )
+    )
+    averages = [
+        variable for variable in run.agent.optimizer.variables if variable.path.endswith("_average")
+    ]
+    weights = run.agent.online.weights
+    assert len(averages) == len(weights)
+    averaged = [
+        all(
+            (average.numpy() == array.numpy()).all()
+            for average, array in zip(averages, weights, strict=True)
+        )
+        for _ in train_episodes(run)
+    ]
+    assert averaged == [False] * 42 + [True]

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.quick
     [
         ("reference", {}, ["best possible", "optimal policy for γ = 0.9", "random actions"]),
         ("reference", {"discount": 1.0}, ["best possible", "random actions"]),
-        ("swingup", {}, ["best possible", "optimal policy for γ = 0.98", "random actions"]),
+        ("swingup", {}, ["best possible", "optimal policy for γ = 0.985", "random actions"]),
         ("reference", {"max_episode_steps": 201}, []),
         ("cartpole", {}, ["best possible", "random actions"]),
     ],

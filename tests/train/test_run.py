@@ -76,12 +76,30 @@ def test_optimizer_has_the_numbers_of_the_settings(
     assert optimizer.amsgrad == (name == "adamw")
 
 
+@pytest.mark.parametrize("updates", [1, 4])
+def test_optimizer_averages_over_the_updates_of_the_settings(updates: int) -> None:
+    optimizer: Any = make_optimizer(kp.preset("reference", average_updates=updates))
+    assert (optimizer.use_ema, optimizer.ema_momentum) == (updates > 1, 1 - 1 / updates)
+    assert optimizer.ema_overwrite_frequency is None
+
+
 @pytest.mark.parametrize(
-    ("schedule", "rates"), [("cosine", [1e-3, 0.5e-3, 0, 0]), ("constant", [1e-3] * 4)]
+    ("schedule", "lowest", "rates"),
+    [
+        ("cosine", 0.0, [1e-3, 0.5e-3, 0, 0]),
+        ("cosine", 2e-4, [1e-3, 0.6e-3, 2e-4, 2e-4]),
+        ("constant", 0.0, [1e-3] * 4),
+    ],
 )
-def test_learning_rate_follows_its_schedule(schedule: str, rates: list[float]) -> None:
+def test_learning_rate_follows_its_schedule(
+    schedule: str, lowest: float, rates: list[float]
+) -> None:
     config = kp.preset(
-        "reference", episodes=44, updates_per_episode=30, learning_rate_schedule=schedule
+        "reference",
+        episodes=44,
+        updates_per_episode=30,
+        learning_rate_schedule=schedule,
+        learning_rate_min=lowest,
     )
     assert config.total_updates == 90
     run = make_run(config)
