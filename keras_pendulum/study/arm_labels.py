@@ -40,8 +40,10 @@ _DESCRIPTIONS: dict[str, _Describe] = {
     "learning_rate_schedule": _choice(
         constant="constant learning rate", cosine="learning rate falls to 0"
     ),
-    "learning_rate_min": lambda rate: f"learning rate at least {rate:g}",
-    "average_updates": lambda count: f"average of {_count('update')(count)}",
+    "learning_rate_min": lambda rate: f"learning rate falls to {rate:g}",
+    "average_updates": lambda count: (
+        "no average of the weights" if count == 1 else f"weights averaged over {count} updates"
+    ),
     "discount": lambda discount: f"discount {discount:g}",
     "reward_scale": lambda scale: f"rewards times {scale:g}",
     "double_q": lambda double: "double Q-learning" if double else "no double Q-learning",

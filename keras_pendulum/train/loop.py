@@ -16,6 +16,8 @@ from keras_pendulum.train.run import Run
 def train_episodes(run: Run) -> Iterator[EpisodeRecord]:
     """Trains from the next episode of the run to its last, and yields each episode's record.
 
+    With the last record, the online weights are the average of `average_updates`.
+
     Raises UserError, with episode and step, when an observation, a reward or a loss is not finite.
     """
     for episode in range(len(run.history), run.config.episodes):

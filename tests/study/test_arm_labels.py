@@ -19,6 +19,8 @@ pytestmark = pytest.mark.quick
         ("updates_per_episode", 30, "30 updates per episode"),
         ("target_update", "none", "no target network"),
         ("hidden_units", (64, 64), "layers of 64, 64"),
+        ("average_updates", 1500, "weights averaged over 1500 updates"),
+        ("average_updates", 1, "no average of the weights"),
         ("double_q", True, "double Q-learning"),
         ("gradient_clip", None, "gradient clip none"),  # a setting without words of its own
     ],
