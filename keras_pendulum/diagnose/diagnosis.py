@@ -203,7 +203,11 @@ def diagnose_measurement(measurement: Measurement, record: RunRecord | None = No
     found = find(evidence)
     found = [finding for finding in found if not (little and finding.name == "undetermined")]
     limits = [] if record is not None or little else [_NO_RUN]
-    return Diagnosis(measurement, [] if little else found, found if little else [], limits)
+    if not little:
+        return Diagnosis(measurement, found, [], limits)
+    # A repair that makes a good agent bad shows that there is no such fault.
+    notes = [each for each in found if each.cost is None or each.cost >= -measurement.little]
+    return Diagnosis(measurement, [], notes, limits)
 
 
 def _diagnose_bare_policy(measurement: Measurement) -> Diagnosis:

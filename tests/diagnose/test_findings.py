@@ -8,7 +8,8 @@ from exact_agent import coarse_value, exact_values, subject
 
 from keras_pendulum.diagnose import comparisons, measurement
 from keras_pendulum.diagnose.diagnosis import Diagnosis, diagnose_subject
-from keras_pendulum.diagnose.findings import RULES
+from keras_pendulum.diagnose.evidence import Evidence
+from keras_pendulum.diagnose.findings import RULES, find
 from keras_pendulum.diagnose.subject import Subject
 from keras_pendulum.diagnose.texts import TEXTS
 
@@ -117,6 +118,18 @@ def test_what_costs_little_is_a_note(fault: str, q_values: Any) -> None:
     assert diagnosis.findings == []
     assert [note.name for note in diagnosis.notes] == [fault]
     assert f"Note, costs little: {fault}" in diagnosis.summary()
+
+
+def test_good_agent_has_no_note_whose_repair_makes_it_bad() -> None:
+    def shrunk(observations: Any) -> Any:  # the best torque stays the best
+        q = exact_values(observations, gravity=10.0, discount=0.98)
+        return 0.25 * q + 0.75 * q.mean(axis=1, keepdims=True)
+
+    agent = subject(shrunk, gravity=10.0, discount=0.98)
+    (finding,) = find(Evidence(measurement.measure(agent), None))
+    assert (finding.name, finding.cost is not None and finding.cost < -100) == ("torque-map", True)
+    diagnosis = diagnose_subject(agent)
+    assert diagnosis.findings == diagnosis.notes == []
 
 
 def test_repair_shows_what_a_reversed_torque_map_costs() -> None:
