@@ -83,18 +83,22 @@ def test_optimal_values_are_the_returns_of_the_optimal_torques(
 
 
 @pytest.mark.parametrize(
-    ("name", "discount", "max_median_error"),
-    [("reference", 0.9, 1.0), ("swingup", 0.985, 15.0)],  # values go down to -74 and to -217
+    ("name", "discount", "max_offset", "max_error"),
+    # Values go down to -74 and to -236. Those of swingup are too high by a common offset, which
+    # changes no torque.
+    [("reference", 0.9, 0.5, 0.5), ("swingup", 0.985, 35.0, 3.0)],
 )
-def test_shipped_networks_have_nearly_the_optimal_values(
-    name: str, discount: float, max_median_error: float
+def test_shipped_networks_have_nearly_the_optimal_values_up_to_an_offset(
+    name: str, discount: float, max_offset: float, max_error: float
 ) -> None:
     planes = run_phase_planes(kp.load_weights(kp.find_weights(name)), kp.preset(name))
     assert list(planes) == ["This policy", f"Exact optimum for γ = {discount}"]
     learned, optimal = planes.values()
     visited = np.abs(SPEED) < 4
-    error = np.abs(learned.value - optimal.value)[visited]
-    assert np.median(error) < max_median_error
+    error = (learned.value - optimal.value)[visited]
+    offset = np.median(error)
+    assert abs(offset) < max_offset
+    assert np.median(np.abs(error - offset)) < max_error
     correlation = np.corrcoef(learned.value[visited].ravel(), optimal.value[visited].ravel())[0, 1]
     assert correlation > 0.95
 
