@@ -25,9 +25,6 @@ _ENVIRONMENT = {
 # A line of the C++ library absl, such as "I0000 00:00:1795466974.767995    4604 port.cc:153] …".
 _NOTE = re.compile(rb"WARNING: All log messages before absl::|[IWE]\d+ [\d:.]+ +\d+ [^ ]+:\d+\] ")
 _ROUNDING = ("TF_NUM_INTRAOP_THREADS", "TF_ENABLE_ONEDNN_OPTS")
-# Batches of this many rows are computed to the same digits with one thread and with two.
-_ROWS_FOR_TWO_THREADS = 64
-_USERS_OWN = frozenset(os.environ)  # names of the variables before this package sets any
 # Whether the user has imported TensorFlow before this package, and without a choice of both.
 _IMPORTED_BEFORE = "tensorflow" in sys.modules
 _MAY_ROUND_OTHERWISE = _IMPORTED_BEFORE and not os.environ.keys() >= set(_ROUNDING)
@@ -56,16 +53,6 @@ def warn_if_not_reproducible() -> None:
             "(docs/reproducibility.md)",
             stacklevel=1,  # this line, so that a process warns once
         )
-
-
-def use_two_threads_if_exact(batch_size: int) -> None:
-    """Sets two threads for a run whose digits do not change with them; call it before the import.
-
-    The user's own value stays. A small batch keeps one thread, because a second one would change
-    the rounding of its matrix products.
-    """
-    if batch_size >= _ROWS_FOR_TWO_THREADS and "TF_NUM_INTRAOP_THREADS" not in _USERS_OWN:
-        os.environ["TF_NUM_INTRAOP_THREADS"] = "2"
 
 
 def use_one_thread() -> None:

@@ -19,11 +19,7 @@ from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import (
-    fast_import,
-    require_tensorflow,
-    use_two_threads_if_exact,
-)
+from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 from keras_pendulum.train.closing_lines import closing_lines
 from keras_pendulum.train.progress_bar import make_progress
 
@@ -82,8 +78,6 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.render:
         require_display()
     live = _live_plot() if arguments.live else None
-    if not arguments.resume:  # the batch size of a resumed run is in its checkpoint
-        use_two_threads_if_exact(config.batch_size)
 
     with fast_import():
         from keras_pendulum.storage.find_weights import find_weights

@@ -48,36 +48,6 @@ def test_tensorflow_uses_one_thread_unless_the_user_sets_another_number() -> Non
     assert threads(TF_NUM_INTRAOP_THREADS="2") == "2"
 
 
-TWO_IF_EXACT = (
-    "import os, keras_pendulum\n"
-    "from keras_pendulum.tensorflow_setup import use_two_threads_if_exact\n"
-    "use_two_threads_if_exact({rows})\n"
-    "print(os.environ['TF_NUM_INTRAOP_THREADS'])"
-)
-DIGITS = """
-import hashlib
-import keras_pendulum as kp
-run = kp.train_dqn(kp.preset("swingup", episodes=43, max_episode_steps=10))
-print(hashlib.sha256(b"".join(each.tobytes() for each in run.network.get_weights())).hexdigest())
-"""
-
-
-@pytest.mark.parametrize(("rows", "expected"), [(32, "1"), (63, "1"), (64, "2"), (128, "2")])
-def test_large_batches_use_two_threads(rows: int, expected: str) -> None:
-    assert run(TWO_IF_EXACT.format(rows=rows)).stdout.strip() == expected
-
-
-def test_users_own_number_of_threads_stays() -> None:
-    own = run(TWO_IF_EXACT.format(rows=64), TF_NUM_INTRAOP_THREADS="3")
-    assert own.stdout.strip() == "3"
-
-
-def test_two_threads_compute_the_digits_of_one_with_batches_of_64() -> None:
-    assert kp.preset("swingup").batch_size == 64
-    digits = [run(DIGITS, TF_NUM_INTRAOP_THREADS=number).stdout for number in ("1", "2")]
-    assert digits[0] == digits[1] != ""
-
-
 def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:
     done = run(AFTER_TENSORFLOW)
     assert done.stdout == "[]\n"
