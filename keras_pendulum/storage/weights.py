@@ -29,6 +29,7 @@ from keras_pendulum.storage.find_weights import find_weights
 from keras_pendulum.storage.keras_h5 import Layer, read_layers, write_layers
 from keras_pendulum.storage.model_config import read_model
 from keras_pendulum.storage.quarantine import H5File, open_h5
+from keras_pendulum.tensorflow_setup import THREADS
 from keras_pendulum.version import __version__
 
 _GROUP = "keras_pendulum"  # a group beside the layers, which Keras ignores
@@ -225,7 +226,7 @@ def _provenance(attributes: dict[str, Any], path: str) -> Provenance:
 
 
 def changed_versions(file: H5File) -> list[str]:
-    """Returns the recorded versions that are not the present ones, such as `keras 3.14.0`."""
+    """Returns what is recorded of `_versions` and differs now, such as `keras 3.14.0`."""
     attributes = file.attributes[_GROUP]
     recorded = {"keras_pendulum": attributes["version"], **json.loads(attributes["versions"])}
     present = {"keras_pendulum": __version__, **_versions()}
@@ -233,7 +234,7 @@ def changed_versions(file: H5File) -> list[str]:
 
 
 def _versions() -> dict[str, str]:
-    """Returns the versions of Python and of the packages that computed the weights."""
+    """Returns what changes the digits of a run: versions, and the number of threads."""
     import gymnasium
     import keras
     import tensorflow as tf
@@ -241,4 +242,5 @@ def _versions() -> dict[str, str]:
     return {
         "python": platform.python_version(),
         **{module.__name__: module.__version__ for module in (tf, keras, gymnasium, np)},
+        THREADS: os.environ.get(THREADS, "0"),  # 0: TensorFlow chooses
     }

@@ -19,7 +19,7 @@ from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow, use_two_threads
 from keras_pendulum.train.closing_lines import closing_lines
 from keras_pendulum.train.progress_bar import make_progress
 
@@ -93,6 +93,10 @@ def _train(arguments: argparse.Namespace) -> int:
         resumed = RunFolder(out)
         resumed.require_run()
         config = replace(load_config(resumed.weights), **settings)
+    # A run with one update in a call gains nothing; `original` needs one thread to repeat the
+    # recorded run to its end.
+    if config.train_frequency == "episode" and config.updates_per_episode > 1:
+        use_two_threads()
     init = None
     if arguments.init:
         init = load_weights(find_weights(arguments.init), config.activation)

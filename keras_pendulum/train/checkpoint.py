@@ -173,8 +173,8 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
         replay = dict(_arrays(file, "replay"))
         if versions := changed_versions(file):
             warnings.warn(
-                f"{os.fsdecode(path)} was saved with {', '.join(versions)}: with other versions, a "
-                "resumed run need not equal an uninterrupted one to the last bit",
+                f"{os.fsdecode(path)} was saved with {', '.join(versions)}, which differs now: "
+                "the resumed run need not equal an uninterrupted one to the last bit",
                 stacklevel=2,
             )
     run = make_run(config, render=render)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
+import h5py
 import pytest
 from conftest import ROOT
 
@@ -27,11 +30,11 @@ for _ in range(2):
 OWN = {"TF_NUM_INTRAOP_THREADS": "4", "TF_ENABLE_ONEDNN_OPTS": "1"}
 
 
-def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(code: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs code in a process without variables of TensorFlow."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
     return subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", code, *arguments],
         env=clean | environment,
         capture_output=True,
         text=True,
@@ -46,6 +49,31 @@ def threads(**environment: str) -> str:
 def test_tensorflow_uses_one_thread_unless_the_user_sets_another_number() -> None:
     assert threads() == "1"
     assert threads(TF_NUM_INTRAOP_THREADS="2") == "2"
+
+
+TRAIN = """
+import os, sys
+from keras_pendulum.train.__main__ import main
+status = main([*sys.argv[1:], "--quiet"])
+print(status, os.environ["TF_NUM_INTRAOP_THREADS"])
+"""
+
+
+@pytest.mark.parametrize(
+    ("preset", "own", "expected"),
+    [("reference", {}, "2"), ("original", {}, "1"), ("reference", OWN, "4")],
+)
+def test_command_trains_with_two_threads_where_they_save_time(
+    preset: str, own: dict[str, str], expected: str, tmp_path: Path
+) -> None:
+    words = ["--preset", preset, "--out", str(tmp_path / "run"), "--hidden-units", "8"]
+    for more in (["--episodes", "1"], ["--episodes", "2", "--resume"]):
+        done = run(TRAIN, *words, *more, **own)
+        assert done.stdout.splitlines()[-1] == f"0 {expected}"
+        assert done.stderr == ""  # the resumed run has the number of threads of the checkpoint
+    with h5py.File(tmp_path / "run" / "pendulum_weight.h5") as file:
+        versions = json.loads(file["keras_pendulum"].attrs["versions"])
+    assert versions["TF_NUM_INTRAOP_THREADS"] == expected
 
 
 def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:

@@ -414,7 +414,9 @@ def test_error_of_the_environment_is_not_reported_as_damage(
         load_checkpoint(tmp_path / "pendulum_weight.h5", config)
 
 
-def test_checkpoint_of_other_versions_is_resumed_with_one_warning(tmp_path: Path) -> None:
+def test_checkpoint_of_other_versions_is_resumed_with_one_warning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config = kp.preset("original", episodes=2, hidden_units=(8,))
     kp.train_dqn(config, tmp_path)
     path = tmp_path / "pendulum_weight.h5"
@@ -423,10 +425,12 @@ def test_checkpoint_of_other_versions_is_resumed_with_one_warning(tmp_path: Path
         versions = {**json.loads(attributes["versions"]), "keras": "3.0.0", "numpy": "2.0.0"}
         attributes["versions"] = np.bytes_(json.dumps(versions))
         attributes["version"] = np.bytes_("0.0.1")
+    monkeypatch.setenv("TF_NUM_INTRAOP_THREADS", "7")
     with pytest.warns(UserWarning) as caught:
         run = load_checkpoint(path, config)
     (message,) = (str(warning.message) for warning in caught)
     assert message.startswith(f"{path} was saved with keras_pendulum 0.0.1, keras 3.0.0, numpy 2.0")
+    assert "TF_NUM_INTRAOP_THREADS 1, which differs now" in message
     assert len(run.history) == 2
 
 
