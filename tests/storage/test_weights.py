@@ -107,13 +107,17 @@ def test_keras_2_loads_a_saved_file(make: Callable[..., Any], keras2: Any, tmp_p
     assert_same_values(model, network(), 1e-6)
 
 
-def test_file_records_the_versions_of_the_installed_packages(tmp_path: Path) -> None:
+def test_file_records_the_versions_of_the_packages_and_the_number_of_threads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TF_NUM_INTRAOP_THREADS", "3")
     kp.save_weights(network(), tmp_path / "a.h5")
     with h5py.File(tmp_path / "a.h5") as file:
         found = json.loads(file["keras_pendulum"].attrs["versions"])
     packages = {name: version(name) for name in ("keras", "gymnasium", "numpy")}
     python = ".".join(map(str, sys.version_info[:3]))
-    assert found == {"python": python, "tensorflow": tf.__version__, **packages}
+    threads = {"TF_NUM_INTRAOP_THREADS": "3"}
+    assert found == {"python": python, "tensorflow": tf.__version__, **packages, **threads}
 
 
 @pytest.mark.parametrize("make_name", ["subclassed", "sequential"])
