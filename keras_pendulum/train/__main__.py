@@ -93,7 +93,7 @@ def _train(arguments: argparse.Namespace) -> int:
         resumed = RunFolder(out)
         resumed.require_run()
         config = replace(load_config(resumed.weights), **settings)
-    # A run with one update in a call gains nothing; `original` needs one thread to repeat the
+    # A run with one update in a call gains little; `original` needs one thread to repeat the
     # recorded run to its end.
     if config.train_frequency == "episode" and config.updates_per_episode > 1:
         use_two_threads()
