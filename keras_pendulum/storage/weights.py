@@ -226,7 +226,7 @@ def _provenance(attributes: dict[str, Any], path: str) -> Provenance:
 
 
 def changed_versions(file: H5File) -> list[str]:
-    """Returns what is recorded of `_versions` and differs now, such as `keras 3.14.0`."""
+    """Returns the recorded `_versions` that are not the present ones, such as `keras 3.14.0`."""
     attributes = file.attributes[_GROUP]
     recorded = {"keras_pendulum": attributes["version"], **json.loads(attributes["versions"])}
     present = {"keras_pendulum": __version__, **_versions()}
@@ -234,7 +234,7 @@ def changed_versions(file: H5File) -> list[str]:
 
 
 def _versions() -> dict[str, str]:
-    """Returns what changes the digits of a run: versions, and the number of threads."""
+    """Returns what the last digits depend on: the versions of Python and its packages, threads."""
     import gymnasium
     import keras
     import tensorflow as tf

@@ -173,7 +173,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
         replay = dict(_arrays(file, "replay"))
         if versions := changed_versions(file):
             warnings.warn(
-                f"{os.fsdecode(path)} was saved with {', '.join(versions)}, which differs now: "
+                f"{os.fsdecode(path)} was saved with {', '.join(versions)}; these differ now: "
                 "the resumed run need not equal an uninterrupted one to the last bit",
                 stacklevel=2,
             )

@@ -430,7 +430,7 @@ def test_checkpoint_of_other_versions_is_resumed_with_one_warning(
         run = load_checkpoint(path, config)
     (message,) = (str(warning.message) for warning in caught)
     assert message.startswith(f"{path} was saved with keras_pendulum 0.0.1, keras 3.0.0, numpy 2.0")
-    assert "TF_NUM_INTRAOP_THREADS 1, which differs now" in message
+    assert "TF_NUM_INTRAOP_THREADS 1; these differ now" in message
     assert len(run.history) == 2
 
 
