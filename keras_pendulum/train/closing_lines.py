@@ -141,7 +141,8 @@ def _why_bad(config: Config, last: EpisodeRecord, folder: RunFolder) -> str:
             f"It had {last.episode + 1} episodes; the preset {config.preset} has {usual}: "
             f"continue with {_resume_words(folder)} --episodes {usual}"
         )
-    if config.learning_rate_schedule == "constant" and config.train_frequency == "episode":
+    constant_rate = config.learning_rate_schedule == "constant" and config.average_updates == 1
+    if constant_rate and config.train_frequency == "episode":
         return (
             "With a constant learning rate, the policy of the last episode may be a bad one: try "
             "--learning-rate-schedule cosine"

@@ -130,6 +130,12 @@ WORSE = [
         "Learning may have diverged: try a smaller --learning-rate (now 0.5) or another --seed",
     ),
     (
+        # A constant rate, but the final network is an average.
+        kp.preset("reference", learning_rate_schedule="constant", average_updates=1500),
+        record(kp.Config.episodes - 1, 13770),
+        "Learning may have diverged: try a smaller --learning-rate (now 0.001) or another --seed",
+    ),
+    (
         kp.preset("cartpole-original"),  # its schedule cannot be the cosine
         record(599, 70000),
         "Learning may have diverged: try a smaller --learning-rate (now 0.0001) or another --seed",
