@@ -65,6 +65,7 @@ def table_row(name: str, regrets: list[float]) -> Row:
         "mean regret": round(sum(regrets) / len(regrets), 2),
         "95 % interval": interval(regrets),
         "worst regret": max(regrets),
+        "runs": len(regrets),
         "regrets": regrets,
     }
 

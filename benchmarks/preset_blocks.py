@@ -113,6 +113,7 @@ def departure_table(preset: str) -> str:
                 preset: format_value(getattr(later, name)),
                 "why": REASONS[preset][name],
                 "regret without it": summary(regrets[name]),
+                "runs": len(regrets[name]),
             }
         )
     runs = len(regrets[preset])
