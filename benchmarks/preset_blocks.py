@@ -116,11 +116,13 @@ def departure_table(preset: str) -> str:
                 "runs": len(regrets[name]),
             }
         )
-    runs = len(regrets[preset])
+    regret_lines = "".join(
+        f"- `{name}`: {summary(regrets[name])}, {len(regrets[name])} runs\n"
+        for name in (preset, earlier.preset)
+    )
     return (
-        f"Over the training seeds 0 to {runs - 1}, the regret of `{preset}` is "
-        f"{summary(regrets[preset])}; that of `{earlier.preset}` is "
-        f"{summary(regrets[earlier.preset])}.\n\n{markdown(rows)}"
+        f"The regrets of both presets over the training seeds 0, 1, …:\n\n{regret_lines}\n"
+        f"{markdown(rows)}"
     )
 
 
