@@ -234,7 +234,7 @@ def changed_versions(file: H5File) -> list[str]:
 
 
 def _versions() -> dict[str, str]:
-    """Returns what the last digits depend on: the versions of Python and its packages, threads."""
+    """Returns the versions and the number of threads that the last digits of a run depend on."""
     import gymnasium
     import keras
     import tensorflow as tf
