@@ -17,7 +17,7 @@ commands write them:
     python -m keras_pendulum.optimum 1 --discount 0.9 --out keras_pendulum/optimum/data
     python -m keras_pendulum.optimum 1 --discount 0.9 --steps 100 --out keras_pendulum/optimum/data
     python -m keras_pendulum.optimum 10 --discount 0.985 --out keras_pendulum/optimum/data
-    python -m keras_pendulum.optimum 10 --discount 0.985 --steps 30 \\
+    python -m keras_pendulum.optimum 10 --discount 0.985 --steps 40 \\
         --out keras_pendulum/optimum/data
 """
 

@@ -86,7 +86,7 @@ def cache_folder() -> Path | None:
 
 
 def file_name(gravity: float, steps: int, discount: float = 1.0) -> str:
-    """Returns a name such as `gravity_10.npz`, `gravity_10_steps_30.npz` or
+    """Returns a name such as `gravity_10.npz`, `gravity_10_steps_40.npz` or
     `gravity_10_discount_0.985.npz`.
     """
     name = f"gravity_{str(gravity).removesuffix('.0')}"

@@ -71,7 +71,7 @@ def test_reference_has_its_numbers() -> None:
 def test_swingup_has_the_numbers_of_the_standard_task() -> None:
     config = kp.preset("swingup")
     assert (config.environment, config.gravity) == ("Pendulum-v1", 10.0)
-    assert (config.episodes, config.max_episode_steps) == (3400, 30)
+    assert (config.episodes, config.max_episode_steps) == (3400, 40)
     assert (config.hidden_units, config.activation) == ((512, 256, 128), "tanh")
     assert (config.torque_count, config.stored_index) == (41, "exact")
     assert (config.replay_capacity, config.batch_size) == (14_000, 64)

@@ -90,7 +90,7 @@ def test_wheel_contains_package_data_and_weights_only(built: Built) -> None:
         "keras_pendulum/optimum/data/gravity_10.npz",
         "keras_pendulum/optimum/data/gravity_10_discount_0.985.npz",
         "keras_pendulum/optimum/data/gravity_1_steps_100.npz",
-        "keras_pendulum/optimum/data/gravity_10_steps_30.npz",
+        "keras_pendulum/optimum/data/gravity_10_steps_40.npz",
         "keras_pendulum/optimum/data/gravity_1_steps_100_discount_0.9.npz",
         "keras_pendulum/shipped_weights/reference.h5",
     }
