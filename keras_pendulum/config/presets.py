@@ -37,7 +37,7 @@ _SWINGUP = replace(
     preset="swingup",
     gravity=10.0,
     episodes=3400,
-    # Most regret arises in the first 20 steps; with 30, one run diverged (docs/last_regret.md).
+    # Most regret arises in the first 20 steps; 30 are too short (docs/last_regret.md).
     max_episode_steps=40,
     initial_weights="spread",
     batch_size=64,
