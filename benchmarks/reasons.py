@@ -39,18 +39,18 @@ REASONS: dict[str, dict[str, str]] = {
         "torques near hanging; their average does not",
     },
     "cartpole": {
-        "replay_capacity": "the whole run: without the early falls in the buffer, the network "
-        "forgets how the pole falls",
         "reward_scale": "1 - γ: then the values are about as large as one reward, which suits "
         "Adam's step",
         "epsilon_min": "random actions bring the cart near the ends of its track; without them "
         "the network does not learn that a slow drift ends there",
         "train_frequency": "one compiled call makes all updates of an episode; without it the "
         "learning rate is constant too",
-        "updates_per_episode": "fewer do not suffice for every training seed",
-        "weight_decay": "limits the values to what a policy can earn",
-        "learning_rate": "the cosine passes the smaller rates anyway",
-        "learning_rate_schedule": "with a constant rate the policy jumps until the last episode",
-        "tau": "the target network follows faster",
+        "learning_rate": "40 updates after an episode are too few for the smaller one",
+        "learning_rate_schedule": "with a constant rate the policy jumps until the last episode, "
+        "and its average may still let the cart drift",
+        "learning_rate_min": "weights that still move a little have a better average",
+        "tau": "the target network follows faster, because there are fewer updates",
+        "average_updates": "the last update may leave a policy that drifts off the track; the "
+        "average of the weights does not",
     },
 }

@@ -185,7 +185,7 @@ def test_largest_checkpoint_of_cartpole_has_41_bytes_for_each_transition() -> No
     # 49 210 962 weights in 5 copies.
     assert 20 * 49_210_962 + 41 * 2_157_848 + 64 * 35 == 1_073_741_824 - 1_048_576
     largest = kp.preset(
-        "cartpole", hidden_units=(8192, 6000), replay_capacity=2_157_848, episodes=35
+        "cartpole-original", hidden_units=(8192, 6000), replay_capacity=2_157_848, episodes=35
     )
     with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
         dataclasses.replace(largest, replay_capacity=2_157_849)

@@ -105,17 +105,15 @@ def test_cartpole_has_its_tuned_numbers() -> None:
     assert tuned == replace(
         original,
         preset="cartpole",
-        replay_capacity=300_000,
         reward_scale=0.01,
-        epsilon_min=0.1,
+        epsilon_min=0.2,
         train_frequency="episode",
-        updates_per_episode=60,
-        weight_decay=0.05,
         learning_rate=1e-3,
         learning_rate_schedule="cosine",
-        tau=0.02,
+        learning_rate_min=1e-4,
+        tau=0.03,
+        average_updates=1500,
     )
-    assert tuned.episodes * tuned.max_episode_steps == tuned.replay_capacity
 
 
 def test_presets_are_listed_under_their_own_names() -> None:
