@@ -83,6 +83,12 @@ class Player:
         event = {"type": kind, "touchPoints": points, "timestamp": seconds}
         self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", event)
 
+    def mouse(self, kind: str, place: tuple[float, float], seconds: float) -> None:
+        """Sends a `mousePressed`, `mouseMoved` or `mouseReleased` at a time in s."""
+        x, y = place
+        event = {"type": kind, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": 1}
+        self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", {**event, "timestamp": seconds})
+
     def run(self, script: str, *arguments: Any) -> Any:
         return self.driver.execute_script(script, *arguments)
 

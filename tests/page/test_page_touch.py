@@ -42,10 +42,12 @@ def test_dragging_turns_the_pendulum_and_starts_an_episode_there(
 def test_a_flick_pushes_the_pendulum(pages: dict[str, str], player: Player) -> None:
     player.open(pages["small"])
     player.press(Keys.SPACE)
-    canvas = player.find("pendulum")
-    flick = ActionChains(player.driver, duration=30)
-    flick.move_to_element_with_offset(canvas, 0, -60).click_and_hold()
-    flick.move_to_element_with_offset(canvas, -20, -57).release().perform()
+    x, y = middle_of(player, "pendulum")
+    now = time.time()
+    player.mouse("mousePressed", (x, y - 60), now)
+    player.mouse("mouseMoved", (x - 20, y - 57), now + 0.03)
+    player.mouse("mouseReleased", (x - 20, y - 57), now + 0.03)
+    player.wait(lambda: not player.run("return pendulum.page.held"))
     assert 0 < player.state()["thetadot"] <= 8
     speed = (
         "const t = new Touch(() => {}); t.moves = arguments[0]; return t.flickSpeed(arguments[1])"
@@ -63,16 +65,16 @@ def test_a_press_on_the_portrait_chooses_the_state(
     player.set_screen(width, height)
     player.open(duel)
     player.press(Keys.SPACE)
-    place = player.run(
+    from_middle = player.run(
         "const c = document.getElementById('portrait'); c.scrollIntoView({block: 'center'});"
-        "const r = c.getBoundingClientRect();"
-        "const [left, right, top, bottom] = portraitEdges(r.width, r.height);"
-        "return [r.left + left + 0.75 * (right - left), r.top + top + 0.25 * (bottom - top)]"
+        "const {width, height} = c.getBoundingClientRect();"
+        "const [left, right, top, bottom] = portraitEdges(width, height);"
+        "return [0.25 * left + 0.75 * right - width / 2, 0.75 * top + 0.25 * bottom - height / 2]"
     )
     pointer = PointerInput(finger, finger)  # type: ignore[no-untyped-call]
     press = ActionBuilder(player.driver, mouse=pointer, duration=0)
     action: Any = press.pointer_action
-    action.move_to_location(*map(round, place)).pointer_down().pointer_up()
+    action.move_to(player.find("portrait"), *map(round, from_middle)).pointer_down().pointer_up()
     press.perform()
     found = player.run("return pendulum.page.episodes.map(e => [e.theta, e.thetadot])")
     np.testing.assert_allclose(found[0], [np.pi / 2, 4], atol=0.1)
