@@ -23,13 +23,13 @@ REASONS: dict[str, dict[str, str]] = {
         "max_episode_steps": "most regret arises in the first 20 steps; so many longer "
         "episodes take more time",
         "initial_weights": "more and sharper features near hanging, where a wrong side costs most",
-        "batch_size": "smaller gradient noise, where returns differ by hundreds; its effect "
-        "depends on the processor",
+        "batch_size": "smaller gradient noise, where returns differ by hundreds",
         "discount": "the γ of `reference` does not look far enough ahead to reach from a swing to "
         "the top",
         "reward_scale": "about 1 - γ: then the values are about as large as one reward, which "
         "suits Adam's step",
-        "epsilon_decay": "exploration lasts longer, because the run has more episodes",
+        "epsilon_decay": "exploration lasts longer, because the run has more episodes; it gained "
+        "more with the training seeds on which the settings were chosen",
         "epsilon_min": "at the end the buffer then holds only what the policy meets; the network "
         "fits that more closely",
         "updates_per_episode": "as many after such short episodes would take more than twice "
