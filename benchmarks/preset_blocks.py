@@ -113,17 +113,12 @@ def departure_table(preset: str) -> str:
                 preset: format_value(getattr(later, name)),
                 "why": REASONS[preset][name],
                 "regret without it": summary(regrets[name]),
-                "runs": len(regrets[name]),
             }
         )
     regret_lines = "".join(
-        f"- `{name}`: {summary(regrets[name])}, {len(regrets[name])} runs\n"
-        for name in (preset, earlier.preset)
+        f"- `{name}`: {summary(regrets[name])}\n" for name in (preset, earlier.preset)
     )
-    return (
-        f"The regrets of both presets over the training seeds 0, 1, …:\n\n{regret_lines}\n"
-        f"{markdown(rows)}"
-    )
+    return f"The regrets of both presets:\n\n{regret_lines}\n{markdown(rows)}"
 
 
 def choosing() -> str:

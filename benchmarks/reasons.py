@@ -32,8 +32,8 @@ REASONS: dict[str, dict[str, str]] = {
         "more with the training seeds on which the settings were chosen",
         "epsilon_min": "at the end the buffer then holds only what the policy meets; the network "
         "fits that more closely",
-        "updates_per_episode": "as many after such short episodes would take more than twice "
-        "the time",
+        "updates_per_episode": "as many after such short episodes take more than twice the time "
+        "and gain nothing",
         "learning_rate_min": "weights that still move a little have a better average",
         "average_updates": "the values change with each update, by more than the difference of two "
         "torques near hanging; their average does not",
