@@ -61,7 +61,9 @@ class Player:
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
     def open(self, address: str) -> None:
+        """Opens a page and waits until it is painted: before that, the browser drops keys."""
         self.driver.get(address)
+        self.wait(lambda: self.run("return performance.getEntriesByType('paint').length > 0"))
 
     def find(self, id: str) -> WebElement:
         return self.driver.find_element(By.ID, id)

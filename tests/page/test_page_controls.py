@@ -87,6 +87,21 @@ def steps_per_second(player: Player) -> float:
     return float(1000 * (last - first) / (end - start))
 
 
+def test_space_that_is_held_pauses_once_and_does_not_scroll(
+    pages: dict[str, str], player: Player
+) -> None:
+    player.set_screen(844, 390)
+    player.open(pages["small"])
+    space = {"key": " ", "code": "Space", "text": " ", "windowsVirtualKeyCode": 32}
+    for repeat in (False, True, True):
+        event = {"type": "keyDown", "autoRepeat": repeat, **space}
+        player.driver.execute_cdp_cmd("Input.dispatchKeyEvent", event)
+    player.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyUp", **space})
+    assert player.text("status") == "Paused. The network drives."
+    time.sleep(0.3)  # a scroll is smooth
+    assert player.run("return scrollY") == 0
+
+
 def test_new_random_start_follows_the_last_step(pages: dict[str, str], player: Player) -> None:
     player.open(pages["small"])
     player.press(Keys.SPACE)

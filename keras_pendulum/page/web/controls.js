@@ -81,7 +81,9 @@ class Controls {
     else if (key in TORQUE_OF_KEY) page.choose(TORQUE_OF_KEY[key]);
     // Up and down scroll the page unless you drive.
     else if (upOrDown && page.episode.youDrive) page.choose(0);
-    else if (key === " " && !onButton && !event.repeat) page.pause();
+    // A held Space does not scroll the page.
+    else if (key === " " && event.repeat && !onButton) event.preventDefault();
+    else if (key === " " && !onButton) page.pause();
     else if (key === "s") page.oneStep();
     else if (key === "m" && !event.repeat) page.showLayer(page.nextLayer());
     else if (key === "h" && !event.repeat) page.restart(Math.PI, 0);
