@@ -87,17 +87,20 @@ def steps_per_second(player: Player) -> float:
     return float(1000 * (last - first) / (end - start))
 
 
-def test_space_that_is_held_pauses_once_and_does_not_scroll(
-    pages: dict[str, str], player: Player
+@pytest.mark.parametrize(
+    ("key", "status"), [(" ", "Paused. The network drives."), ("t", "You drive.")]
+)
+def test_key_that_is_held_acts_once_and_does_not_scroll(
+    key: str, status: str, pages: dict[str, str], player: Player
 ) -> None:
     player.set_screen(844, 390)
     player.open(pages["small"])
-    space = {"key": " ", "code": "Space", "text": " ", "windowsVirtualKeyCode": 32}
-    for repeat in (False, True, True):
-        event = {"type": "keyDown", "autoRepeat": repeat, **space}
+    pressed = {"key": key, "text": key, "windowsVirtualKeyCode": ord(key.upper())}
+    for repeat in (False, True):
+        event = {"type": "keyDown", "autoRepeat": repeat, **pressed}
         player.driver.execute_cdp_cmd("Input.dispatchKeyEvent", event)
-    player.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyUp", **space})
-    assert player.text("status") == "Paused. The network drives."
+    player.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyUp", **pressed})
+    assert player.text("status") == status
     time.sleep(0.3)  # a scroll is smooth
     assert player.run("return scrollY") == 0
 

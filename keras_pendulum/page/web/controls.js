@@ -5,6 +5,7 @@ const TORQUE_OF_KEY = { j: -2, arrowleft: -2, k: 0, l: 2, arrowright: 2 }; // NÂ
 const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1] };
 const NUDGE = [0.1, 0.5]; // rad, rad/s
 const FINE_NUDGE = [0.01, 0.1]; // with Shift
+const ONCE = [" ", "m", "h", "r", "t", "p"]; // keys that act once when they are held
 
 /** Connects buttons, keys, pointers and preferences to the page. */
 class Controls {
@@ -73,23 +74,22 @@ class Controls {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const key = event.key.toLowerCase();
     const { id, localName } = event.target;
-    const onButton = localName === "button";
     const upOrDown = key === "arrowup" || key === "arrowdown";
     if (localName === "input" && (ARROWS[key] || key === " ")) return; // the slider's own keys
+    if (localName === "button" && key === " ") return; // presses the button
+    if (event.repeat && ONCE.includes(key)) return event.preventDefault(); // Space would scroll
     if (id === "portrait" && ARROWS[key]) this.#nudge(ARROWS[key], event.shiftKey);
     else if (page.heldByKey && (key === "enter" || key === " ")) page.letGo();
     else if (key in TORQUE_OF_KEY) page.choose(TORQUE_OF_KEY[key]);
     // Up and down scroll the page unless you drive.
     else if (upOrDown && page.episode.youDrive) page.choose(0);
-    // A held Space does not scroll the page.
-    else if (key === " " && event.repeat && !onButton) event.preventDefault();
-    else if (key === " " && !onButton) page.pause();
+    else if (key === " ") page.pause();
     else if (key === "s") page.oneStep();
-    else if (key === "m" && !event.repeat) page.showLayer(page.nextLayer());
-    else if (key === "h" && !event.repeat) page.restart(Math.PI, 0);
-    else if (key === "r" && !event.repeat) page.restart();
-    else if (key === "t" && !event.repeat) page.drive(!page.episode.youDrive);
-    else if (key === "p" && !event.repeat) page.playTraining();
+    else if (key === "m") page.showLayer(page.nextLayer());
+    else if (key === "h") page.restart(Math.PI, 0);
+    else if (key === "r") page.restart();
+    else if (key === "t") page.drive(!page.episode.youDrive);
+    else if (key === "p") page.playTraining();
     else return;
     event.preventDefault();
   }
