@@ -1,6 +1,12 @@
 """Errors that a user can correct; each message is one line."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _LONGEST = 300  # characters of a message
 
@@ -30,6 +36,17 @@ def require_type(name: str, value: object, expected: type | tuple[type, ...]) ->
         types = expected if isinstance(expected, tuple) else (expected,)
         names = " or ".join(kind.__name__ for kind in types)
         raise TypeError(one_line(f"{name} is {value!r}; expected {names}"))
+
+
+def require_finite(weights: Iterable[NDArray[Any]]) -> None:
+    """Raises UserError when a weight is NaN or infinite, which `load_weights` rejects."""
+    import numpy as np
+
+    if not all(np.isfinite(array).all() for array in weights):
+        raise UserError(
+            "a weight is not finite, learning has diverged; such a network is neither saved nor "
+            "evaluated: try a smaller learning_rate"
+        )
 
 
 def did_you_mean(word: str, names: Iterable[str]) -> str:

@@ -2,46 +2,63 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.environments.torque import MAX_TORQUE, require_torque
+from keras_pendulum.errors import ConfigError
 
-MAX_TORQUE = 2.0  # N·m, the limit of Pendulum-v1
 
+class Actions:
+    """The A actions that the outputs of a network stand for.
 
-class Actions(Protocol):
-    """The A actions of an environment."""
+    Args:
+        values: the actions as the environment takes them, [A] or [A, ...].
+    """
+
+    def __init__(self, values: NDArray[Any]) -> None:
+        self.values = values
 
     @property
     def count(self) -> int:
         """Number of actions A."""
+        return len(self.values)
 
     def to_env_action(self, index: int) -> Any:
         """Returns the action as the environment takes it."""
+        return self.values[index]
 
     def stored_index(self, index: int) -> int:
         """Returns the index that the replay buffer stores for the action `index`."""
+        return index
 
 
-class DiscreteActions:
+class DiscreteActions(Actions):
     """The `count` actions of an environment that takes indices, such as CartPole-v1."""
 
     def __init__(self, count: int) -> None:
-        self.count = count
+        super().__init__(np.arange(count))
 
     def to_env_action(self, index: int) -> int:
         """Returns the index."""
         return index
 
-    def stored_index(self, index: int) -> int:
-        """Returns the index."""
-        return index
+
+class TorqueActions(Actions):
+    """Torques [A] in N·m. They are float64: a float32 torque changes the last digits."""
+
+    def __init__(self, torques: NDArray[np.float64]) -> None:
+        super().__init__(torques[:, np.newaxis])  # [A, 1]
+
+    @property
+    def torques(self) -> NDArray[np.float64]:
+        """The torques [A] in N·m."""
+        return self.values[:, 0]
 
 
-class TorqueGrid:
+class TorqueGrid(TorqueActions):
     """`count` torques evenly spaced from -2 to 2 N·m: `linspace(-2, 2, count)`.
 
     Gymnasium's `DiscretizeAction` cannot replace it: its values are bin centres, ±1.951 N·m at the
@@ -49,23 +66,7 @@ class TorqueGrid:
     """
 
     def __init__(self, count: int = 41) -> None:
-        self.torques: NDArray[np.float64] = np.linspace(-MAX_TORQUE, MAX_TORQUE, count)  # [A] N·m
-
-    @property
-    def count(self) -> int:
-        """Number of actions A."""
-        return len(self.torques)
-
-    def to_env_action(self, index: int) -> NDArray[np.float64]:
-        """Returns the torque as the environment takes it: [1], N·m.
-
-        It is float64, as in the original: a float32 torque changes the last digits of the physics.
-        """
-        return self.torques[index : index + 1]
-
-    def stored_index(self, index: int) -> int:
-        """Returns the index."""
-        return index
+        super().__init__(np.linspace(-MAX_TORQUE, MAX_TORQUE, count))
 
     def nearest_index(self, torque: float) -> int:
         """Returns the index of the torque nearest to `torque` (N·m).
@@ -77,7 +78,7 @@ class TorqueGrid:
         return round((torque + MAX_TORQUE) / step)
 
 
-class TruncatingTorqueGrid(TorqueGrid):
+class TruncatingTorqueGrid(TorqueActions):
     """The walkthrough's torques k/10 - 2, with its defect `index-truncation`.
 
     The replay buffer gets an index that is computed back from the torque. Floating-point rounding
@@ -85,34 +86,33 @@ class TruncatingTorqueGrid(TorqueGrid):
     """
 
     def __init__(self) -> None:
-        super().__init__(41)
-        self.torques = np.arange(41) / 10 - 2  # [A] N·m
+        super().__init__(np.arange(41) / 10 - 2)
 
     def stored_index(self, index: int) -> int:
         """Returns the truncated index."""
         return truncated_index(float(self.torques[index]))
 
 
+def torque_actions(torques: ArrayLike | None, count: int | None = None) -> TorqueActions:
+    """Returns the torques [A] in N·m that a user gives; for None, `count` evenly spaced ones.
+
+    Raises ConfigError unless they are numbers from -2 to 2, `count` of them where it is known.
+    """
+    if torques is None:
+        return TorqueGrid(count or 41)
+    try:
+        array = np.asarray(torques)
+    except ValueError:  # lists of several lengths
+        array = np.empty(0, object)
+    if array.dtype.kind not in "fiu" or array.ndim != 1:
+        raise ConfigError(f"torques are {torques!r}; expected a list of numbers (N·m)")
+    if not (np.abs(array) <= MAX_TORQUE).all():  # written so that NaN fails too
+        raise ConfigError(f"torques are {torques!r}; expected numbers from -2 to 2 (N·m)")
+    if count is not None and len(array) != count:
+        raise ConfigError(f"torques has {len(array)} numbers; the agent has {count} actions")
+    return TorqueActions(array.astype(np.float64))
+
+
 def truncated_index(torque: float | np.floating[Any]) -> int:
     """Returns the walkthrough's index of a torque (N·m): truncated, not rounded."""
     return int((torque + 2) * 10)
-
-
-def make_actions(environment: str, torque_count: int, stored_index: str = "exact") -> Actions:
-    """Returns the actions of an environment of TASKS.
-
-    Args:
-        environment: Gymnasium's name.
-        torque_count: how many torques, where the environment takes torques.
-        stored_index: exact, or truncated for the defect `index-truncation`.
-    """
-    action_count = TASKS[environment].action_count
-    if action_count is not None:
-        return DiscreteActions(action_count)
-    return TruncatingTorqueGrid() if stored_index == "truncated" else TorqueGrid(torque_count)
-
-
-def require_torque(torque: float) -> None:
-    """Raises ValueError for a torque (N·m) that is not finite or outside ±2 N·m."""
-    if not abs(torque) <= MAX_TORQUE:  # written so that NaN fails too
-        raise ValueError(f"torque {torque} N·m; expected a number from -2 to 2")

@@ -69,15 +69,17 @@ def _evaluate(arguments: argparse.Namespace) -> int:
 
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluate_policy
-        from keras_pendulum.evaluate.named_agent import named_agent
+        from keras_pendulum.evaluate.named_policy import named_policy
 
     def require_open_window(env: Any) -> None:
-        if _window_closed():  # Gymnasium ignores a closed window
+        import pygame
+
+        if pygame.event.get(pygame.QUIT):  # Gymnasium ignores a closed window
             raise UserError("the window was closed before the end of the last episode")
 
-    agent, name = named_agent(arguments.agent, arguments.torques, arguments.activation)
+    policy = named_policy(arguments.agent, arguments.torques, arguments.activation)
     score = evaluate_policy(
-        agent,
+        policy,
         arguments.episodes,
         arguments.seed,
         gravity=arguments.gravity,
@@ -86,20 +88,13 @@ def _evaluate(arguments: argparse.Namespace) -> int:
         on_step=require_open_window if arguments.render else None,
     )
     if arguments.gif or arguments.video:
-        shown = Path(name).stem if Path(name).is_file() else name
-        make_films(arguments, agent.action, score.environment, score.gravity, shown)
+        shown = Path(policy.name).stem if Path(policy.name).is_file() else policy.name
+        make_films(arguments, policy, score.task, shown)
     if arguments.json:
-        print(json.dumps({"weights": name, **score.as_json()}))
+        print(json.dumps({"weights": policy.name, **score.as_json()}))
     else:
         print(score.summary())
     return 0
-
-
-def _window_closed() -> bool:
-    """Returns whether the user has closed the window since the last call."""
-    import pygame
-
-    return bool(pygame.event.get(pygame.QUIT))
 
 
 if __name__ == "__main__":

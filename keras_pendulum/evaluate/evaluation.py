@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import math
-from functools import cache, partial
+import contextlib
+import itertools
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from keras_pendulum.config.config import Config
-from keras_pendulum.config.settings import validate_setting
-from keras_pendulum.dqn.network import Provenance
-from keras_pendulum.environments.actions import make_actions
-from keras_pendulum.environments.tasks import TASKS, make_environment, pendulum_starts
-from keras_pendulum.errors import ConfigError
-from keras_pendulum.evaluate.agents import as_agent
-from keras_pendulum.evaluate.episodes import OnStep, episode_return, episode_returns
+from keras_pendulum.config.fields import Integer, Number
+from keras_pendulum.errors import ConfigError, UserError
+from keras_pendulum.evaluate.answers import ActionError
+from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.score import Score
-from keras_pendulum.optimum.discounted import validate_discount
-from keras_pendulum.optimum.dynamics import TORQUES, simulate_return
-from keras_pendulum.optimum.optimal_return import USUAL_SEEDS, optimal_return
+from keras_pendulum.evaluate.sources import as_policy
+from keras_pendulum.optimum.solutions import solution
+
+Env = gymnasium.Env[Any, Any]
+OnStep = Callable[[Env], None]
+_SIDE_BY_SIDE = 100  # episodes
 
 
 def evaluate_policy(
@@ -48,7 +49,7 @@ def evaluate_policy(
         on_step: called with the environment after each reset and each step.
 
     Raises ConfigError for a number out of range, and for a gravity, a discount or torques that the
-    agent cannot have. Raises UserError when a weight is not finite, and for an answer that is no
+    agent cannot have. Raises UserError when a weight is not finite, and for an answer that is not a
     torque, with its episode and step. Raises WeightsError as `load_weights` does, and TypeError for
     another agent.
 
@@ -56,80 +57,64 @@ def evaluate_policy(
     >>> score.returns.shape, score.regret < 5
     ((10,), True)
     """
-    agent = as_agent(agent, torques)
-    episodes = validate_setting("episodes", episodes)
-    seed = validate_setting("seed", seed)
-    validate_setting("seed", seed + episodes - 1)
-    environment = agent.environment
-    gravity = evaluation_gravity(agent.provenance or Provenance(), gravity)
+    policy = as_policy(agent, torques)
+    episodes = Integer(1, 1_000_000).validate("episodes", episodes)
+    seed = Integer(0, 2**32 - episodes).validate("seed", seed)
+    task = policy.task.with_gravity(gravity)
     if discount is None:
-        discount = agent.discount
-    elif gravity is None:
-        raise ConfigError(f"discount belongs to Pendulum-v1; {environment} has no exact solution")
-    else:
-        discount = validate_discount(discount)
-    seeds = range(seed, seed + episodes)
-    make = partial(make_environment, environment, gravity, render_mode)
-    watched = render_mode is not None or on_step is not None
-    returns = episode_returns(agent, make, seeds, on_step, one_by_one=watched)
-    if gravity is None:
-        return Score(
-            environment, None, returns, np.full(episodes, TASKS[environment].optimal_return)
+        discount = policy.info.discount
+    elif not task.has_exact_values:
+        raise ConfigError(
+            f"discount belongs to Pendulum-v1; {task.environment} has no exact solution"
         )
-    optimum = optimal_return(gravity, seeds)
-    return Score(environment, gravity, returns, optimum, discount, seeds)
+    else:
+        discount = Number(0, 1).validate("discount", discount)
+    seeds = range(seed, seed + episodes)
+    # One episode after the other where it is watched, or the policy needs it. Otherwise the policy
+    # gets the observations of many episodes of the same length in one call.
+    alone = policy.one_by_one or render_mode is not None or on_step is not None
+    count = 1 if alone else min(_SIDE_BY_SIDE, episodes)
+    with contextlib.ExitStack() as stack:
+        envs = [
+            stack.enter_context(contextlib.closing(task.make_env(render_mode)))
+            for _ in range(count)
+        ]
+        returns = np.concatenate(
+            [
+                _returns(policy, envs, seeds[first : first + count], first, on_step)
+                for first in range(0, episodes, count)
+            ]
+        )
+    return Score(task, returns, solution(task).best_returns(seeds), discount, seeds)
 
 
-def evaluation_gravity(provenance: Provenance, gravity: float | None = None) -> float | None:
-    """Returns the gravity (m/s²) to evaluate a network at; None for CartPole.
+def _returns(
+    policy: Policy, envs: Sequence[Env], seeds: range, first: int, on_step: OnStep | None
+) -> NDArray[np.float64]:
+    """Returns the undiscounted return of an episode for each seed, in environments of their own.
 
-    It is `gravity`, else the recorded one, else 1. Raises ConfigError for a gravity out of range,
-    and for any gravity on CartPole.
+    Raises UserError for an answer that is not an action, with its step and the number of its
+    episode, which is `first` for the first seed.
     """
-    if not TASKS[provenance.environment].has_torque:
-        if gravity is not None:
-            raise ConfigError(f"gravity belongs to Pendulum-v1; {provenance.environment} has none")
-        return None
-    for candidate in (gravity, provenance.gravity):
-        if candidate is not None:
-            return float(validate_setting("gravity", candidate))
-    return Config.gravity
-
-
-def optimal_training_return(config: Config) -> float:
-    """Returns the mean optimal return of a training episode; NaN for a pendulum beyond 200 steps.
-
-    For the pendulum it is the mean over seeds 0 to 999. CartPole's reward is 1 per step.
-    """
-    if config.gravity is None:
-        return float(config.max_episode_steps)
-    if config.max_episode_steps > TASKS[config.environment].steps_per_episode:
-        return math.nan
-    return float(optimal_return(config.gravity, USUAL_SEEDS, config.max_episode_steps).mean())
-
-
-@cache
-def random_return(
-    environment: str, gravity: float | None, steps: int, episodes: int = 100
-) -> float:
-    """Returns the mean return of uniformly random actions from the starts of seeds 0, 1, ….
-
-    Args:
-        environment: Gymnasium's name.
-        gravity: m/s²; None for CartPole.
-        steps: an episode is truncated after so many steps.
-        episodes: number of episodes.
-    """
-    random = np.random.RandomState(0)
-    if gravity is not None:  # simulating all episodes in one array is 20 times as fast as a loop
-        torques = random.randint(len(TORQUES), size=(episodes, steps))
-        starts = pendulum_starts(range(episodes))
-        returns = simulate_return(lambda step, *_: torques[:, step], steps, gravity, starts)
-        return float(returns.mean())
-    env = make_environment(environment, gravity, steps=steps)
-    actions = make_actions(environment, len(TORQUES))
-
-    def act(observation: NDArray[np.float32]) -> Any:
-        return actions.to_env_action(random.randint(actions.count))
-
-    return float(np.mean([episode_return(env, start, act) for start in range(episodes)]))
+    envs = envs[: len(seeds)]
+    observations = [env.reset(seed=seed)[0] for env, seed in zip(envs, seeds, strict=True)]
+    policy.reset()
+    if on_step:
+        on_step(envs[0])
+    returns = np.zeros(len(envs))
+    for step in itertools.count():
+        try:
+            if len(envs) == 1:
+                actions: Any = [policy.action(observations[0])]
+            else:
+                actions = policy.act(np.stack(observations))  # [B, ...]
+        except ActionError as error:
+            raise UserError(f"episode {first + error.row}, step {step}: {error}") from error
+        for row, env in enumerate(envs):
+            observations[row], reward, terminated, truncated, _ = env.step(actions[row])
+            returns[row] += float(reward)
+            if on_step:
+                on_step(env)
+        if terminated or truncated:
+            break
+    return returns

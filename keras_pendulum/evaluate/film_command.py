@@ -1,19 +1,31 @@
-"""The flags of `evaluate` that make films, and their work."""
+"""The flags of `evaluate` that make films, and the files of these films."""
 
 from __future__ import annotations
 
 import argparse
+import io
+import math
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import nonempty_path, require_ending
 from keras_pendulum.display import draw_without_display
-from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, one_line
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 
 if TYPE_CHECKING:
-    from keras_pendulum.evaluate.film import Act
+    from PIL.Image import Image
+
+    from keras_pendulum.environments.task import Task
+    from keras_pendulum.evaluate.policy import Policy
+
+_STARTS = {"hanging": 180.0, "upright": 0.0}  # angles in degrees
+_GIF_SECONDS = 0.1  # of a frame; many programs show shorter ones too slowly
 
 
 def add_film_flags(parser: argparse.ArgumentParser) -> None:
@@ -29,11 +41,25 @@ def add_film_flags(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--start",
-        type=_start,
+        type=parse_start,
         metavar="START",
         help="start of the film: hanging, upright, or an angle in degrees, 0 is upright [that of "
         "--seed]",
     )
+
+
+def parse_start(text: str) -> float:
+    """Returns the angle in degrees. Raises ArgumentTypeError for any other text."""
+    try:
+        angle = _STARTS[text] if text in _STARTS else float(text)
+    except ValueError:
+        angle = math.nan
+    if not -180 <= angle <= 180:  # written so that NaN fails too
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no start: expected hanging, upright, or an angle from -180 to 180 (°, 0 "
+            "is upright)"
+        )
+    return angle
 
 
 def require_film_files(arguments: argparse.Namespace) -> None:
@@ -44,52 +70,73 @@ def require_film_files(arguments: argparse.Namespace) -> None:
         require_no_other_file(Path(arguments.gif), b"GIF8", "a GIF")
         require_ending("--gif", arguments.gif, ".gif")
     if arguments.video:
-        from keras_pendulum.evaluate.film import find_ffmpeg
-
         require_ending("--video", arguments.video, ".mp4")
         require_no_other_file(Path(arguments.video), b"ftyp", "an MP4", offset=4)
         find_ffmpeg()
 
 
-def make_films(
-    arguments: argparse.Namespace, act: Act, environment: str, gravity: float | None, name: str
-) -> None:
-    """Writes the films that the flags ask for.
+def make_films(arguments: argparse.Namespace, policy: Policy, task: Task, name: str) -> None:
+    """Writes the films that the flags ask for; they show the name.
 
-    Args:
-        arguments: of the command line.
-        act: the policy.
-        environment: Gymnasium's name.
-        gravity: m/s²; None for CartPole.
-        name: of the policy, to show in the films.
+    Raises ConfigError for --start where the start cannot be chosen.
     """
-    if not arguments.gif and not arguments.video:
-        return
-    from keras_pendulum.evaluate.film import (
-        encode_gif,
-        encode_mp4,
-        film_episode,
-        find_ffmpeg,
-        shown_in_gif,
-    )
-    from keras_pendulum.evaluate.film_start import require_pendulum
+    from keras_pendulum.evaluate.film import film_episode
 
-    if arguments.start is not None:
-        require_pendulum(environment)
+    seed, angle = arguments.seed, arguments.start
+    start = f"start of seed {seed}"
+    if angle is not None:
+        names = {named_angle: name for name, named_angle in _STARTS.items()}
+        start = f"start: {names.get(angle, f'{angle:g}°')}"
+    _, *physics = task.name.split(", ")
+    title = ", ".join([name, *(f"{each} m/s²" for each in physics)])
     draw_without_display()
-    seconds = TASKS[environment].seconds_per_step
-    pictures = list(
-        film_episode(
-            act, environment, gravity, name=name, seed=arguments.seed, angle=arguments.start
-        )
-    )
+    pictures = list(film_episode(policy, task, (title, start), seed, angle))
     if arguments.gif:
-        write_atomically(arguments.gif, encode_gif(shown_in_gif(pictures, seconds)))
+        # Some steps are left out, but not the last one.
+        interval = round(_GIF_SECONDS / task.seconds_per_step)
+        shown = pictures[(len(pictures) - 1) % interval :: interval]
+        write_atomically(arguments.gif, encode_gif(shown))
     if arguments.video:
-        write_atomically(arguments.video, encode_mp4(find_ffmpeg(), pictures, seconds))
+        film = encode_mp4(find_ffmpeg(), pictures, task.seconds_per_step)
+        write_atomically(arguments.video, film)
 
 
-def _start(text: str) -> float:
-    from keras_pendulum.evaluate.film_start import parse_start
+def encode_gif(pictures: Sequence[Image]) -> bytes:
+    """Returns a looping GIF."""
+    stream = io.BytesIO()
+    pictures[0].save(
+        stream,
+        format="GIF",
+        save_all=True,
+        append_images=pictures[1:],
+        duration=round(1000 * _GIF_SECONDS),
+        loop=0,
+    )
+    return stream.getvalue()
 
-    return parse_start(text)
+
+def find_ffmpeg() -> str:
+    """Returns the path of the program ffmpeg. Raises UserError where it is not installed."""
+    path = shutil.which("ffmpeg")
+    if path is None:
+        raise UserError("--video needs the program ffmpeg: install it, or make a film with --gif")
+    return path
+
+
+def encode_mp4(ffmpeg: str, pictures: Sequence[Image], seconds_per_frame: float) -> bytes:
+    """Returns an MP4 film that browsers show; the sides of the pictures are even numbers.
+
+    Raises UserError when ffmpeg fails.
+    """
+    width, height = pictures[0].size
+    with tempfile.TemporaryDirectory() as folder:
+        film = Path(folder) / "film.mp4"
+        words = [ffmpeg, "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"]
+        words += ["-s", f"{width}x{height}", "-r", f"{1 / seconds_per_frame:g}", "-i", "-"]
+        words += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", os.fspath(film)]
+        frames = b"".join(picture.convert("RGB").tobytes() for picture in pictures)
+        done = subprocess.run(words, input=frames, capture_output=True, check=False)
+        if done.returncode:
+            reason = one_line(done.stderr.decode(errors="replace").strip())
+            raise UserError(f"ffmpeg failed: {reason}")
+        return film.read_bytes()

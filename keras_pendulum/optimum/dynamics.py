@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.actions import TorqueGrid
+from keras_pendulum.environments.pendulum import MAX_SPEED
 
 TIME_STEP = 0.05  # s
-MAX_SPEED = 8.0  # rad/s
 TORQUES = TorqueGrid().torques  # [41] N·m
 
 ByTorque = NDArray[np.float64]  # [N, 41]: one value for each of N states and each torque
@@ -23,14 +23,10 @@ def simulate_return(
     gravity: float,
     starts: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Returns the undiscounted returns [N] of simulated episodes, without interpolation.
+    """Returns the undiscounted returns [N] of episodes from `starts` [N, 2] (θ, θ̇).
 
-    Args:
-        choose_torques: returns the torques' indices [N]; its arguments are the number of the step,
-            from 0, and the three results of `step_all_torques` for that step.
-        steps: steps per episode.
-        gravity: g in m/s².
-        starts: [N, 2], θ in rad and θ̇ in rad/s.
+    `choose_torques` returns the torques' indices [N]. Its arguments are the number of the step,
+    from 0, and the three results of `step_all_torques` for that step.
     """
     theta, speed = starts.T  # [N]
     returns = np.zeros(len(starts))

@@ -1,67 +1,29 @@
-"""The optimum: the highest return of the pendulum from the start of each reset seed.
+"""The optimum: the return of the optimal policy of the pendulum from the start of each reset seed.
 
-Each is the simulated return of a policy that is greedy on the tables of `value_iteration`, so it is
-attainable. V itself need not be. At g = 10 it has discontinuities: a start from which the pendulum
-can just be caught is worth 30 more than its neighbour. Interpolation smooths them, which makes V
-wrong by up to 50 in both directions.
-
-The greedy policy misses some of these catches. Where V and the simulated return differ (at g = 10
-from one start in 22, at g = 1 from none), a search tries every torque in the first steps.
-
-Accuracy, as the distance to the highest known return, seeds 0 to 999:
-
-- g = 1: at most 0.01.
-- g = 10: at most 0.1, for five seeds at most 0.3, on average 0.003. Without the search, seeds 28
-  and 657 would be 17 and 23 too low, and the mean of the seeds 0 to 99 -132.54, not -132.37.
-- g = 10, 40 steps (preset `swingup`): at most 0.05, on average 0.0001, with a mean of -131.31. The
-  comparison is with tables of 1200 cells for every step.
-
-The package contains the optima of seeds 0 to 9999 for g = 1, for g = 10, and for g = 10 with
-40 steps. These commands write them:
-
-    python -m keras_pendulum.optimum 1 10 --out keras_pendulum/optimum/data
-    python -m keras_pendulum.optimum 10 --steps 40 --out keras_pendulum/optimum/data
-
-All others are computed at their first use and stored in the user's cache folder.
+The package contains the returns of seeds 0 to 9999 for g = 1 and for g = 10, for whole episodes and
+for the training episodes of `reference` and `swingup`. It contains those of the policies that are
+optimal for the discounts of these presets, for seeds 0 to 999.
+`python -m benchmarks.learning.shipped_optima` writes them. All others are computed at their first
+use, by `best_return`, and stored in the user's cache folder.
 """
 
 from __future__ import annotations
 
-import itertools
-import logging
-import math
-import operator
 from collections.abc import Iterable
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, pendulum_starts
-from keras_pendulum.errors import ConfigError
-from keras_pendulum.optimum.dynamics import step_all_torques
-from keras_pendulum.optimum.return_cache import stored_returns
-from keras_pendulum.optimum.value_iteration import (
-    FINE_CELLS,
-    greedy_return,
-    solve,
-    value_at,
-    value_tables,
-)
-
-_log = logging.getLogger(__name__)
-
-COARSE_CELLS = 100  # coarse enough to store the tables of all 200 steps, 1.3 MB each
-SMOOTH_TOLERANCE = 0.05  # where V is smooth, V and the simulated return differ by less
-SEARCHED_STEPS = 3  # a fourth improves almost nothing
-LARGEST_SEED = 2**32 - 1
-SHIPPED_SEEDS = range(10_000)
-USUAL_SEEDS = range(1000)  # computed together, because most of the time goes into V
+from keras_pendulum.config.fields import Integer
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, pendulum_starts
+from keras_pendulum.optimum.solution import USUAL_SEEDS
+from keras_pendulum.optimum.stored_results import Problem, cache_file, read_returns, write_to_cache
 
 
 def optimal_return(
-    gravity: float = 1.0,
-    seeds: Iterable[int] = range(100),
-    steps: int = STEPS_PER_EPISODE,
+    gravity: float = 1.0, seeds: Iterable[int] = range(100), steps: int = STEPS_PER_EPISODE
 ) -> NDArray[np.float64]:
     """Returns the highest undiscounted return of an episode from each start `reset(seed=…)`.
 
@@ -82,83 +44,33 @@ def optimal_return(
     >>> kp.optimal_return(gravity=1.0, seeds=range(3)).shape
     (3,)
     """
-    gravity = validate_gravity(gravity)
-    seeds = [validate_seed(seed) for seed in seeds]
-    steps = validate_steps(steps)
-
-    def compute(missing: list[int]) -> NDArray[np.float64]:
-        _log.warning("Computing the best possible returns for g = %g, once: about 20 s", gravity)
-        return best_return(gravity, pendulum_starts(missing), steps)
-
-    return stored_returns(seeds, compute, USUAL_SEEDS, gravity, steps)
+    return discounted_return(gravity, 1.0, seeds, steps)
 
 
-def best_return(gravity: float, starts: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
-    """Returns the highest return [N] of three policies from `starts` [N, 2] (θ in rad, θ̇ in rad/s).
+def discounted_return(
+    gravity: float,
+    discount: float,
+    seeds: Iterable[int] = range(100),
+    steps: int = STEPS_PER_EPISODE,
+) -> NDArray[np.float64]:
+    """Returns the undiscounted returns of the policy that is optimal for a discount γ, 0 to 1.
 
-    1. Greedy on the fine table of the start in every step. It is the best where the pendulum can be
-       swung up in time. From about g = 17 on it cannot. V then depends on the remaining steps, and
-       at g = 20 this policy would lose 5 %.
-    2. Greedy on coarse tables, one for each step. They lose at most 0.3 % against finer ones. V
-       also depends on the remaining steps in short episodes. Those need fewer tables, so the tables
-       are finer in the same memory.
-    3. A search in the first steps, then policy 1. It is used near the discontinuities of V.
+    They are as those of `optimal_return`, which are those for γ = 1. Raises ConfigError for a
+    number out of range.
     """
-    table = solve(gravity, steps)
-    cells = min(FINE_CELLS, COARSE_CELLS * STEPS_PER_EPISODE // steps)
-    tables = list(itertools.islice(value_tables(gravity, cells), steps))
-    fine = greedy_return([table] * steps, gravity, starts)
-    coarse = greedy_return(tables, gravity, starts)
-    best = np.maximum(fine, coarse)
-    discontinuous = np.abs(value_at(table, *starts.T) - best) > SMOOTH_TOLERANCE
-    for i in np.flatnonzero(discontinuous & (fine >= coarse)):
-        best[i] = max(best[i], _search_return(table, gravity, starts[i], steps))
-    return best
+    problem, valid_seed = Problem.valid(gravity, steps, discount), Integer(0, 2**32 - 1)
+    seeds = [valid_seed.validate("seed", seed) for seed in seeds]
+    shipped = Path(str(resources.files("keras_pendulum.optimum"))) / "data" / problem.file_name
+    cache = cache_file(problem.file_name)
+    returns = read_returns(shipped, problem)
+    if not returns.keys() >= set(seeds):
+        returns = read_returns(cache, problem) | returns
+    if not returns.keys() >= set(seeds):
+        from keras_pendulum.optimum.best_return import compute_returns  # rarely needed
 
-
-def _search_return(
-    table: NDArray[np.float32], gravity: float, start: NDArray[np.float64], steps: int
-) -> float:
-    """Returns the highest return from `start` [2] (θ, θ̇) that trying every torque finds.
-
-    Each of the first steps tries the 41 torques. The return of a torque is not read from V: it is
-    simulated with greedy steps after the torque. The greedy torque is among the 41, so no step
-    makes the return worse.
-    """
-    state, past_rewards = start, 0.0
-    for step in range(1, min(SEARCHED_STEPS, steps) + 1):
-        rewards, theta, speed = step_all_torques(gravity, state[:1], state[1:])  # [1, A]
-        next_states = np.stack([theta[0], speed[0]], axis=1)  # [A, 2]
-        future_rewards = greedy_return([table] * (steps - step), gravity, next_states)  # [A]
-        returns = past_rewards + rewards[0] + future_rewards  # [A]
-        best = returns.argmax()
-        past_rewards += float(rewards[0, best])
-        state = next_states[best]
-    return float(returns[best])
-
-
-def validate_gravity(gravity: float) -> float:
-    """Returns the gravity in m/s² as a float. Raises ConfigError unless it is 0 to 100."""
-    try:
-        number = float(gravity)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not 0 <= number <= 100:  # written so that NaN fails too
-        raise ConfigError(f"gravity is {gravity!r}; expected a number from 0 to 100 (m/s²)")
-    return number + 0.0  # -0.0 becomes 0.0
-
-
-def validate_seed(seed: int) -> int:
-    """Returns the reset seed as an int. Raises ConfigError unless it is 0 to 2³² - 1."""
-    number = operator.index(seed)
-    if not 0 <= number <= LARGEST_SEED:
-        raise ConfigError(f"seed is {seed}; expected 0 to {LARGEST_SEED}")
-    return number
-
-
-def validate_steps(steps: int) -> int:
-    """Returns the steps per episode as an int. Raises ConfigError unless they are 1 to 200."""
-    number = operator.index(steps)
-    if not 1 <= number <= STEPS_PER_EPISODE:
-        raise ConfigError(f"steps is {steps}; expected 1 to {STEPS_PER_EPISODE}")
-    return number
+        missing = sorted({*seeds, *USUAL_SEEDS} - returns.keys())
+        computed = compute_returns(problem, pendulum_starts(missing))
+        returns |= zip(missing, computed.tolist(), strict=True)
+        values = np.array(list(returns.values()))
+        write_to_cache(cache, problem, seeds=np.array(list(returns)), returns=values)
+    return np.array([returns[seed] for seed in seeds], np.float64)

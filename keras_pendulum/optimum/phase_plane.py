@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import TorqueGrid
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE
-from keras_pendulum.optimum.dynamics import MAX_SPEED, TORQUES, step_all_torques
-from keras_pendulum.optimum.value_iteration import solve, value_at
+from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE, Pendulum
+from keras_pendulum.optimum.discounted import exact_q
+from keras_pendulum.optimum.dynamics import TORQUES
+from keras_pendulum.optimum.value_iteration import solve
 
 if TYPE_CHECKING:
     from keras_pendulum.config.config import Config
@@ -37,33 +38,28 @@ class PhasePlane:
 def run_phase_planes(network: DQN, config: Config) -> dict[str, PhasePlane]:
     """Returns the phase planes of a run's network and of its optimum, by name.
 
-    The optimum is that of the run's gravity and discount. The result is empty for CartPole.
+    The optimum is that of the run's gravity and discount. The result is empty for another task than
+    the pendulum.
     """
-    if config.gravity is None:
+    task = config.task
+    if not isinstance(task, Pendulum):
         return {}
     return {
         "This policy": network_phase_plane(network, config.reward_scale),
         f"Exact optimum for γ = {config.discount:g}": optimal_phase_plane(
-            config.gravity, config.discount
+            task.gravity, config.discount
         ),
     }
 
 
 def network_phase_plane(network: DQN, reward_scale: float = 1.0) -> PhasePlane:
-    """Returns the greedy torques and the values of a network.
-
-    Args:
-        network: a Q-network of the pendulum.
-        reward_scale: the run's factor on the rewards; the values are divided by it.
-    """
-    policy, grid = greedy_policy(network), TorqueGrid(network.action_count)
-    torque, value = [], []
-    for speed in _SPEED:  # one row at a time, which needs little memory
-        columns = [np.cos(_THETA), np.sin(_THETA), np.full(POINTS, speed)]
-        q = policy.q_values(np.stack(columns, axis=1, dtype=np.float32))  # [POINTS, A]
-        torque.append(grid.torques[q.argmax(axis=1)])
-        value.append(q.max(axis=1) / reward_scale)
-    return PhasePlane(np.array(torque), np.array(value))
+    """Returns the greedy torques of a Q-network, and its values divided by the `reward_scale`."""
+    policy, columns = greedy_policy(network), [np.cos(_THETA), np.sin(_THETA)]
+    rows = [
+        policy.q_values(np.stack([*columns, np.full(POINTS, speed)], axis=1, dtype=np.float32))
+        for speed in _SPEED  # one row at a time, which needs little memory
+    ]
+    return _phase_plane(rows, TorqueGrid(network.action_count).torques, reward_scale)
 
 
 def optimal_phase_plane(gravity: float, discount: float) -> PhasePlane:
@@ -71,19 +67,18 @@ def optimal_phase_plane(gravity: float, discount: float) -> PhasePlane:
 
     They are computed by `value_iteration` over the steps whose discount factor is above 0.001, at
     most an episode. The policy for a discount below 1 need not attain the highest return.
-
-    Args:
-        gravity: m/s².
-        discount: γ, 0 to 1.
     """
     horizon = STEPS_PER_EPISODE
     if 0 < discount < 1:
         horizon = min(horizon, math.ceil(math.log(1e-3) / math.log(discount)))
     table = solve(gravity, horizon, _THETA_CELLS, discount)
-    torque, value = [], []
-    for speed in _SPEED:
-        rewards, theta, next_speed = step_all_torques(gravity, _THETA, np.full(POINTS, speed))
-        q = rewards + discount * value_at(table, theta, next_speed)  # [POINTS, A]
-        torque.append(TORQUES[q.argmax(axis=1)])
-        value.append(q.max(axis=1))
-    return PhasePlane(np.array(torque), np.array(value))
+    rows = [exact_q(table, gravity, discount, _THETA, np.full(POINTS, speed)) for speed in _SPEED]
+    return _phase_plane(rows, TORQUES)
+
+
+def _phase_plane(
+    rows: list[NDArray[Any]], torques: NDArray[np.float64], reward_scale: float = 1.0
+) -> PhasePlane:
+    """Returns the phase plane of Q-values: one [POINTS, A] for each speed."""
+    torque = np.array([torques[q.argmax(axis=1)] for q in rows])
+    return PhasePlane(torque, np.array([q.max(axis=1) / reward_scale for q in rows]))

@@ -21,10 +21,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.actions import MAX_TORQUE
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE
+from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.optimum.dynamics import (
-    MAX_SPEED,
     TIME_STEP,
     TORQUES,
     ByTorque,
@@ -125,7 +124,10 @@ def value_tables(
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         while True:
             yield value
-            mirrored = _mirrored(np.float32(discount) * value, margin)
+            discounted = np.float32(discount) * value
+            # `margin` more columns on both sides, from V(-θ, -θ̇) = V(θ, θ̇).
+            before, after = discounted[::-1, margin:0:-1], discounted[::-1, -2 : -2 - margin : -1]
+            mirrored = np.concatenate([before, discounted, after], axis=1)
             list(pool.map(shift_in_theta, row_groups))
             successor_line[:pad] = successor_line[pad]  # the speed is clipped to ±8 rad/s
             successor_line[-pad:] = successor_line[-pad - 1]
@@ -158,20 +160,25 @@ def value_at(
 
 
 def greedy_return(
-    tables: Sequence[NDArray[np.float32]], gravity: float, starts: NDArray[np.float64]
+    tables: Sequence[NDArray[np.float32]],
+    gravity: float,
+    starts: NDArray[np.float64],
+    discount: float = 1.0,
 ) -> NDArray[np.float64]:
-    """Returns the simulated returns [N] of the policy that is greedy on V of the next state.
+    """Returns the undiscounted returns [N] of the policy that is greedy on V of the next state.
 
     Args:
         tables: one for each step of the episode; the step before the last k uses `tables[k]`.
-        gravity: g in m/s².
+        gravity: m/s².
         starts: [N, 2], θ in rad and θ̇ in rad/s.
+        discount: γ of V.
     """
 
     def choose_greedy(
         step: int, rewards: ByTorque, next_theta: ByTorque, next_speed: ByTorque
     ) -> NDArray[np.intp]:
-        return (rewards + value_at(tables[-1 - step], next_theta, next_speed)).argmax(axis=1)
+        value = value_at(tables[-1 - step], next_theta, next_speed)
+        return (rewards + discount * value).argmax(axis=1)
 
     return simulate_return(choose_greedy, len(tables), gravity, starts)
 
@@ -182,13 +189,3 @@ def _whole_and_fraction(
     """Returns the whole cells of a position and the remaining fraction of a cell."""
     whole = np.floor(position)
     return whole.astype(np.intp), (position - whole).astype(np.float32)
-
-
-def _mirrored(value: NDArray[np.float32], margin: int) -> NDArray[np.float32]:
-    """Returns the table [S, T] with `margin` more columns on both sides.
-
-    They come from V(-θ, -θ̇) = V(θ, θ̇).
-    """
-    before = value[::-1, margin:0:-1]
-    after = value[::-1, -2 : -2 - margin : -1]
-    return np.concatenate([before, value, after], axis=1)

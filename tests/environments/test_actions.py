@@ -9,10 +9,14 @@ from keras_pendulum.environments.actions import (
     DiscreteActions,
     TorqueGrid,
     TruncatingTorqueGrid,
-    make_actions,
-    require_torque,
+    torque_actions,
     truncated_index,
 )
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.torque import require_torque
+from keras_pendulum.errors import ConfigError
 
 
 def test_grid_is_the_linspace_of_the_original() -> None:
@@ -81,20 +85,20 @@ def test_truncating_grid_stores_index_2_as_1_and_4_as_3() -> None:
 
 
 @pytest.mark.parametrize(
-    ("environment", "stored_index", "kind", "count"),
-    [
-        ("Pendulum-v1", "exact", TorqueGrid, 7),
-        ("Pendulum-v1", "truncated", TruncatingTorqueGrid, 41),
-        ("CartPole-v1", "exact", DiscreteActions, 2),
-    ],
+    ("task", "kind", "count"),
+    [(Pendulum(), TorqueGrid, 7), (CartPole(), DiscreteActions, 2)],
 )
-def test_make_actions_returns_the_actions_of_the_environment(
-    environment: str, stored_index: str, kind: type, count: int
-) -> None:
-    actions = make_actions(environment, torque_count=7, stored_index=stored_index)
+def test_actions_are_those_of_the_task(task: Task, kind: type, count: int) -> None:
+    actions = task.actions(7)
     assert type(actions) is kind
-    assert actions.count == count
+    assert actions.count == task.action_count(7) == count
+    np.testing.assert_array_equal(
+        [actions.to_env_action(index) for index in range(count)], actions.values
+    )
 
 
-def test_make_actions_stores_exact_indices_by_default() -> None:
-    assert type(make_actions("Pendulum-v1", 41)) is TorqueGrid
+def test_given_torques_are_those_of_the_outputs() -> None:
+    assert torque_actions([2, 0, -1], 3).values.tolist() == [[2.0], [0.0], [-1.0]]
+    assert torque_actions(None, 3).torques.tolist() == [-2.0, 0.0, 2.0]
+    with pytest.raises(ConfigError, match="torques has 3 numbers; the agent has 4 actions"):
+        torque_actions([2, 0, -1], 4)

@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 from gymnasium.wrappers import PassiveEnvChecker
 
-from keras_pendulum.environments.actions import make_actions
-from keras_pendulum.environments.tasks import (
-    STEPS_PER_EPISODE,
-    TASKS,
-    make_environment,
-    pendulum_starts,
-)
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum, pendulum_starts
+from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.tasks import TASKS, make_task
+from keras_pendulum.errors import ConfigError
 
-GRAVITY = {"Pendulum-v1": 1.0, "CartPole-v1": None}
+EXAMPLES = (Pendulum(), CartPole())  # one of each
 
 
 def episode(env: gymnasium.Env[Any, Any], action: Any) -> list[tuple[Any, ...]]:
@@ -29,55 +27,65 @@ def episode(env: gymnasium.Env[Any, Any], action: Any) -> list[tuple[Any, ...]]:
     return steps
 
 
-@pytest.mark.parametrize("name", TASKS)
-def test_properties_of_a_task_are_those_of_gymnasium(name: str) -> None:
-    task = TASKS[name]
-    env = gymnasium.make(name)
+def test_there_is_an_example_of_each_task() -> None:
+    assert [type(task) for task in EXAMPLES] == list(TASKS.values())
+
+
+@pytest.mark.parametrize("task", EXAMPLES)
+def test_properties_of_a_task_are_those_of_gymnasium(task: Task) -> None:
+    env = gymnasium.make(task.environment)
     assert env.spec is not None
     assert env.spec.max_episode_steps == task.steps_per_episode
     assert env.observation_space.shape == (task.observation_size,)
+    assert all(env.action_space.contains(a) for a in task.actions().values.astype(np.float32)) or (
+        env.action_space == gymnasium.spaces.Discrete(task.actions().count)
+    )
     simulation: Any = env.unwrapped
-    if task.has_torque:
-        assert isinstance(env.action_space, gymnasium.spaces.Box)
-        assert simulation.dt == task.seconds_per_step
-    else:
-        assert isinstance(env.action_space, gymnasium.spaces.Discrete)
-        assert env.action_space.n == task.action_count
-        assert simulation.tau == task.seconds_per_step
+    assert task.seconds_per_step == getattr(simulation, "dt", getattr(simulation, "tau", None))
 
 
 def test_pendulum_is_truncated_and_never_terminates() -> None:
-    steps = episode(make_environment("Pendulum-v1", 1.0), np.array([2.0]))
-    assert len(steps) == STEPS_PER_EPISODE == TASKS["Pendulum-v1"].steps_per_episode
+    steps = episode(Pendulum().make_env(), np.array([2.0]))
+    assert len(steps) == STEPS_PER_EPISODE == Pendulum.steps_per_episode
     assert not any(step[2] for step in steps)
-    assert TASKS["Pendulum-v1"].never_terminates
+    assert Pendulum.never_terminates
 
 
 def test_cartpole_terminates_and_pays_1_for_each_step() -> None:
-    task = TASKS["CartPole-v1"]
-    steps = episode(make_environment("CartPole-v1", None), 0)
+    task = CartPole()
+    steps = episode(task.make_env(), 0)
     assert len(steps) < 20
     assert steps[-1][2]
     assert {step[1] for step in steps} == {1.0}
     assert not task.never_terminates
-    assert task.optimal_return == task.steps_per_episode
 
 
-@pytest.mark.parametrize(("name", "steps"), [("Pendulum-v1", 7), ("CartPole-v1", 3)])
-def test_steps_truncate_an_episode(name: str, steps: int) -> None:
-    env = make_environment(name, GRAVITY[name], steps=steps)
-    truncated = [step[3] for step in episode(env, make_actions(name, 41).to_env_action(0))]
+@pytest.mark.parametrize(("task", "steps"), [(Pendulum(), 7), (CartPole(), 3)])
+def test_steps_truncate_an_episode(task: Task, steps: int) -> None:
+    env = task.make_env(steps=steps)
+    truncated = [step[3] for step in episode(env, task.actions().to_env_action(0))]
     assert truncated == [False] * (steps - 1) + [True]
 
 
 def test_gravity_is_that_of_the_pendulum() -> None:
-    simulation: Any = make_environment("Pendulum-v1", 2.5).unwrapped
-    assert simulation.g == 2.5
+    task = make_task("Pendulum-v1", {"gravity": 2.5, "seed": 3})
+    simulation: Any = task.make_env().unwrapped
+    assert simulation.g == task.gravity == 2.5
+    assert (task.name, CartPole().name) == ("Pendulum-v1, g = 2.5", "CartPole-v1")
+    assert task.with_gravity(0).gravity == 0
+    with pytest.raises(ConfigError, match=r"^gravity belongs to Pendulum-v1; CartPole-v1 has none"):
+        CartPole().with_gravity(1.0)
 
 
-@pytest.mark.parametrize("name", TASKS)
-def test_environment_has_no_checker(name: str) -> None:
-    env: Any = make_environment(name, GRAVITY[name])
+@pytest.mark.parametrize("gravity", [-1.0, 100.1, float("nan"), float("inf"), "x", None])
+def test_gravity_out_of_range_is_refused(gravity: Any) -> None:
+    with pytest.raises(ConfigError, match=r"^gravity is .* number from 0 to 100"):
+        Pendulum(gravity)
+
+
+@pytest.mark.parametrize("task", EXAMPLES)
+def test_environment_has_no_checker(task: Task) -> None:
+    env: Any = task.make_env()
     while isinstance(env, gymnasium.Wrapper):
         assert not isinstance(env, PassiveEnvChecker)
         env = env.env

@@ -15,9 +15,11 @@ import torch
 from numpy.typing import NDArray
 
 import keras_pendulum as kp
-from keras_pendulum.dqn.network import Provenance
-from keras_pendulum.evaluate.agents import Agent, as_agent, recorded_discount
+from keras_pendulum.environments.actions import TorqueActions
 from keras_pendulum.evaluate.answers import ActionError
+from keras_pendulum.evaluate.policy import Policy
+from keras_pendulum.evaluate.sources import as_policy
+from keras_pendulum.storage.run_info import RunInfo
 
 OBSERVATIONS = np.random.default_rng(0).uniform(-1, 1, (9, 3)).astype(np.float32)
 GRID = np.linspace(-2, 2, 5)
@@ -26,6 +28,11 @@ GRID = np.linspace(-2, 2, 5)
 @pytest.fixture(scope="module")
 def network() -> kp.DQN:
     return kp.DQN((8, 6), 5, seed=3)
+
+
+def torques_of(policy: Policy) -> NDArray[np.float64]:
+    assert isinstance(policy.actions, TorqueActions)
+    return policy.actions.torques
 
 
 def dense_chain(network: kp.DQN) -> keras.Model:
@@ -100,16 +107,16 @@ class PredictsTorque(Predicts):
 
 
 def a_torque(network: kp.DQN) -> Callable[[NDArray[np.float32]], Any]:
-    policy = kp.Policy(network)
+    policy = kp.load_policy(network)
     return lambda observation: policy(observation)[0]
 
 
 def an_array(network: kp.DQN) -> Callable[[NDArray[np.float32]], Any]:
-    return kp.Policy(network)
+    return kp.load_policy(network)
 
 
 def q_in_numpy(network: kp.DQN) -> Any:
-    return kp.q_function(kp.Policy(network).q_values, GRID)
+    return kp.q_function(kp.load_policy(network).q_values, GRID)
 
 
 def q_in_tensorflow(network: kp.DQN) -> Any:
@@ -122,7 +129,7 @@ def q_in_torch_with_gradients(network: kp.DQN) -> Any:
 
 
 KINDS: dict[str, Callable[[kp.DQN], Any]] = {
-    "policy": kp.Policy,
+    "policy": kp.load_policy,
     "Sequential": dense_chain,
     "functional": lambda network: keras.Model(
         inputs := keras.Input((3,)), dense_chain(network)(inputs)
@@ -136,22 +143,21 @@ KINDS: dict[str, Callable[[kp.DQN], Any]] = {
     "predict, torque": PredictsTorque,
     "torque": a_torque,
     "torque in an array": an_array,
-    "Agent": as_agent,
+    "Policy": as_policy,
 }
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_of_agent_has_the_returns_of_the_network(kind: str, network: kp.DQN) -> None:
     source = KINDS[kind](network)
-    agent = as_agent(source)
-    own = as_agent(network)
+    agent = as_policy(source)
+    own = as_policy(network)
     np.testing.assert_array_equal(agent.act(OBSERVATIONS), own.act(OBSERVATIONS))
-    if agent.q_values is not None:
-        assert own.q_values is not None
+    if agent.has_q_values:
         np.testing.assert_allclose(
             agent.q_values(OBSERVATIONS), own.q_values(OBSERVATIONS), atol=1e-5
         )
-        np.testing.assert_array_equal(agent.torques, GRID)
+        np.testing.assert_array_equal(torques_of(agent), GRID)
     score, expected = (kp.evaluate_policy(each, 3) for each in (source, network))
     np.testing.assert_allclose(score.returns, expected.returns, rtol=1e-9)
 
@@ -161,8 +167,8 @@ def test_file_of_keras_is_the_model(ending: str, network: kp.DQN, tmp_path: Path
     path = tmp_path / f"mine{ending}"
     model = dense_chain(network)
     (model.save_weights if ending == ".weights.h5" else model.save)(path)
-    agent = as_agent(path)
-    np.testing.assert_array_equal(agent.act(OBSERVATIONS), as_agent(network).act(OBSERVATIONS))
+    agent = as_policy(path)
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS), as_policy(network).act(OBSERVATIONS))
     assert agent.name == str(path)
 
 
@@ -175,12 +181,12 @@ def test_keras_file_with_other_layers_is_read_by_keras(tmp_path: Path) -> None:
     model.save(path)
     with pytest.raises(kp.WeightsError, match="expected a chain of Dense layers"):
         kp.load_weights(path)
-    agent = as_agent(path, torques=[-2, -1, 1, 2])
+    agent = as_policy(path, torques=[-2, -1, 1, 2])
     expected = np.array([-2, -1, 1, 2])[np.asarray(model(OBSERVATIONS)).argmax(axis=1)]
-    np.testing.assert_array_equal(agent.act(OBSERVATIONS), expected)
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS)[:, 0], expected)
     model.save(tmp_path / "mine.h5")
     with pytest.raises(kp.WeightsError, match=r"save other models as \.keras$"):
-        as_agent(tmp_path / "mine.h5")
+        as_policy(tmp_path / "mine.h5")
 
 
 class Touch:
@@ -198,7 +204,7 @@ def test_code_in_a_keras_file_is_not_run(tmp_path: Path, monkeypatch: pytest.Mon
     )
     model.save("mine.keras")
     with pytest.raises(kp.WeightsError, match=r"Keras cannot load it .* give file\.py:name"):
-        as_agent("mine.keras")
+        as_policy("mine.keras")
 
 
 def test_damaged_keras_file_never_reaches_keras(
@@ -209,45 +215,44 @@ def test_damaged_keras_file_never_reaches_keras(
     path.write_bytes(path.read_bytes()[:-200])
     monkeypatch.setattr(keras.saving, "load_model", None)
     with pytest.raises(kp.WeightsError, match=r"mine\.keras: "):
-        as_agent(path)
+        as_policy(path)
 
 
 def test_network_without_weights_is_refused() -> None:
     with pytest.raises(kp.UserError, match="has no weights yet"):
-        as_agent(Subclassed())
+        as_policy(Subclassed())
 
 
 def test_torch_module_is_evaluated_in_its_evaluation_mode(network: kp.DQN) -> None:
     module = torch.nn.Sequential(torch.nn.Dropout(0.9), torch_module(network))
     module[1].eval()
-    agent = as_agent(kp.q_function(module))
-    np.testing.assert_array_equal(agent.act(OBSERVATIONS), as_agent(network).act(OBSERVATIONS))
+    agent = as_policy(kp.q_function(module))
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS), as_policy(network).act(OBSERVATIONS))
     assert [part.training for part in (module, module[0], module[1])] == [True, True, False]
 
 
 def test_torques_stand_for_the_outputs(network: kp.DQN) -> None:
     torques = np.array([2.0, 1.5, 0.0, -1.5, -2.0])
-    index = kp.Policy(network).q_values(OBSERVATIONS).argmax(axis=1)
+    index = kp.load_policy(network).q_values(OBSERVATIONS).argmax(axis=1)
     for source in (network, dense_chain(network), Predicts(network)):
-        agent = as_agent(source, torques=torques)
-        np.testing.assert_array_equal(agent.act(OBSERVATIONS), torques[index])
-        np.testing.assert_array_equal(agent.torques, torques)
-        if agent.env_action:
-            assert agent.env_action(OBSERVATIONS[0]) == torques[index[:1]]
+        agent = as_policy(source, torques=torques)
+        np.testing.assert_array_equal(agent.act(OBSERVATIONS)[:, 0], torques[index])
+        np.testing.assert_array_equal(torques_of(agent), torques)
+        assert agent.action(OBSERVATIONS[0]) == torques[index[:1]]
 
 
 def test_known_discount_is_that_of_the_run_or_of_stable_baselines3(network: kp.DQN) -> None:
-    assert as_agent("swingup").discount == 0.985
-    assert as_agent(Predicts(network)).discount == 0.97
-    assert as_agent(network).discount is None
+    assert as_policy("swingup").info.discount == 0.985
+    assert as_policy(Predicts(network)).info.discount == 0.97
+    assert as_policy(network).info.discount is None
     for config in (None, "", "{", "[]", "{}", '{"discount": 2}', '{"discount": "x"}', "[" * 10**5):
-        assert recorded_discount(Provenance(config=config)) is None
+        assert RunInfo.from_record({"config": config}).discount is None
 
 
 def test_values_of_stable_baselines3s_dqn_are_known(network: kp.DQN) -> None:
-    agent = as_agent(Predicts(network))
-    assert agent.q_values is not None
-    expected = kp.Policy(network).q_values(OBSERVATIONS)
+    agent = as_policy(Predicts(network))
+    assert agent.has_q_values
+    expected = kp.load_policy(network).q_values(OBSERVATIONS)
     np.testing.assert_allclose(agent.q_values(OBSERVATIONS), expected, atol=1e-5)
 
 
@@ -265,22 +270,22 @@ def test_values_of_stable_baselines3s_dqn_are_known(network: kp.DQN) -> None:
 def test_wrong_torques_are_refused(torques: Any, problem: str, network: kp.DQN) -> None:
     for source in (network, dense_chain(network), Predicts(network)):
         with pytest.raises(kp.ConfigError, match=problem):
-            as_agent(source, torques)
+            as_policy(source, torques)
 
 
 @pytest.mark.parametrize(
     "source",
-    [a_torque, PredictsTorque, q_in_numpy, lambda network: kp.load_policy("cartpole"), as_agent],
+    [a_torque, PredictsTorque, q_in_numpy, lambda network: kp.load_policy("cartpole")],
 )
 def test_torques_are_refused_where_nothing_stands_for_one(source: Any, network: kp.DQN) -> None:
     with pytest.raises(kp.ConfigError, match=r"^torques "):
-        as_agent(source(network), torques=GRID)
+        as_policy(source(network), torques=GRID)
 
 
 @pytest.mark.parametrize("source", [3, None, {}, kp.DQN, object(), torch.nn.Linear(3, 5)])
 def test_other_objects_are_refused_with_what_is_expected(source: Any) -> None:
     with pytest.raises(TypeError, match=r"^agent is .*kp\.q_function"):
-        as_agent(source)
+        as_policy(source)
 
 
 def with_spaces(**spaces: Any) -> Any:
@@ -298,11 +303,11 @@ def with_spaces(**spaces: Any) -> Any:
 )
 def test_model_of_another_task_is_refused(spaces: dict[str, Any], problem: str) -> None:
     with pytest.raises(kp.ConfigError, match=problem):
-        as_agent(with_spaces(**spaces))
+        as_policy(with_spaces(**spaces))
 
 
-def answering(answer: Any) -> Agent:
-    return as_agent(lambda observation: answer)
+def answering(answer: Any) -> Policy:
+    return as_policy(lambda observation: answer)
 
 
 @pytest.mark.parametrize(
@@ -327,9 +332,9 @@ def test_answer_that_is_no_torque_is_refused(answer: Any, problem: str) -> None:
 
 def test_torques_in_all_libraries_and_types_are_accepted() -> None:
     for answer in (1, np.float32(1), np.array([1]), [1.0], torch.ones(1), tf.ones(()), np.int8(1)):
-        np.testing.assert_array_equal(answering(answer).act(OBSERVATIONS), np.ones(9))
+        np.testing.assert_array_equal(answering(answer).act(OBSERVATIONS), np.ones((9, 1)))
     half = torch.ones(1, dtype=torch.bfloat16, requires_grad=True)
-    np.testing.assert_array_equal(answering(half).act(OBSERVATIONS), np.ones(9))
+    np.testing.assert_array_equal(answering(half).act(OBSERVATIONS), np.ones((9, 1)))
 
 
 @pytest.mark.parametrize(
@@ -345,7 +350,7 @@ def test_torques_in_all_libraries_and_types_are_accepted() -> None:
 def test_answer_that_is_no_index_is_refused(answer: Any, problem: str) -> None:
     model = with_spaces(predict=lambda self, observation, deterministic: answer)
     with pytest.raises(ActionError, match=problem):
-        as_agent(model).act(OBSERVATIONS)
+        as_policy(model).act(OBSERVATIONS)
 
 
 @pytest.mark.parametrize(
@@ -374,5 +379,5 @@ def test_row_of_a_wrong_answer_is_known() -> None:
         return 3.0 if (observation == OBSERVATIONS[6]).all() else 0.0
 
     with pytest.raises(ActionError) as caught:
-        as_agent(act).act(OBSERVATIONS)
+        as_policy(act).act(OBSERVATIONS)
     assert caught.value.row == 6

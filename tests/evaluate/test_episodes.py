@@ -9,14 +9,15 @@ import pytest
 from numpy.typing import NDArray
 
 import keras_pendulum as kp
-from keras_pendulum.evaluate import episodes
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.evaluate import evaluation
 
 NETWORK = kp.DQN((8,), 5, seed=3)
 
 
 def asked(batches: list[tuple[int, ...]]) -> Any:
     """Returns the network as a function that notes the shapes of its observations."""
-    policy = kp.Policy(NETWORK)
+    policy = kp.load_policy(NETWORK)
 
     def values(observations: NDArray[np.float32]) -> NDArray[np.float32]:
         batches.append(observations.shape)
@@ -26,7 +27,7 @@ def asked(batches: list[tuple[int, ...]]) -> Any:
 
 
 def test_many_episodes_are_made_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(episodes, "_SIDE_BY_SIDE", 3)
+    monkeypatch.setattr(evaluation, "_SIDE_BY_SIDE", 3)
     batches: list[tuple[int, ...]] = []
     agent = asked(batches)
     batches.clear()
@@ -66,8 +67,8 @@ def test_function_with_a_state_sees_one_episode_after_the_other() -> None:
 def test_wrong_answer_is_reported_with_episode_and_step(
     batched: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(episodes, "_SIDE_BY_SIDE", 2)
-    start = start_of_seed(4)
+    monkeypatch.setattr(evaluation, "_SIDE_BY_SIDE", 2)
+    start = Pendulum().make_env().reset(seed=4)[0]
     calls = [0]
 
     def torque(observation: NDArray[np.float32]) -> float:
@@ -82,12 +83,6 @@ def test_wrong_answer_is_reported_with_episode_and_step(
     problem = "a Q-value that is not finite" if batched else "the torque 2.5 N·m; expected .*"
     with pytest.raises(kp.UserError, match=rf"^episode 3, step 0: the agent returned {problem}$"):
         kp.evaluate_policy(agent, 5, seed=1)
-
-
-def start_of_seed(seed: int) -> NDArray[np.float32]:
-    from keras_pendulum.environments.tasks import make_environment
-
-    return np.asarray(make_environment("Pendulum-v1", 1.0).reset(seed=seed)[0])
 
 
 def test_exception_of_the_agent_is_reported_with_its_place() -> None:

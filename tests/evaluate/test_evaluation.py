@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import gymnasium
@@ -9,18 +8,15 @@ import pytest
 from conftest import DATA
 
 import keras_pendulum as kp
-from keras_pendulum.dqn.network import Provenance
-from keras_pendulum.evaluate.evaluation import (
-    evaluation_gravity,
-    optimal_training_return,
-    random_return,
-)
-from keras_pendulum.optimum.discounted import discounted_return
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.optimum.optimal_return import discounted_return
 
 
 def test_returns_equal_those_of_a_plain_loop_on_gymnasium() -> None:
     network = kp.DQN((8,), seed=1)
     score = kp.evaluate_policy(network, episodes=3, seed=5)
+    np.testing.assert_array_equal(score.optimal_returns, kp.optimal_return(1, [5, 6, 7]))
     env = gymnasium.make("Pendulum-v1", g=1.0)
     torques = np.linspace(-2, 2, 41)
     for i in range(3):
@@ -42,8 +38,6 @@ def test_network_policy_path_and_shipped_name_are_evaluated_alike() -> None:
     }
     with pytest.raises(kp.WeightsError, match="nonsense: no such file"):
         kp.evaluate_policy("nonsense")
-    with pytest.raises(kp.UserError, match="CartPole-v1 has none"):
-        kp.evaluate_policy("cartpole", 1, gravity=1)
 
 
 def test_two_evaluations_give_the_same_numbers() -> None:
@@ -54,7 +48,7 @@ def test_two_evaluations_give_the_same_numbers() -> None:
 
 
 def test_score_computes_its_statistics() -> None:
-    score = kp.Score("Pendulum-v1", 1.0, np.array([-1.0, -2.0, -9.0]), np.array([-1.0, -1.0, -4.0]))
+    score = kp.Score(Pendulum(), np.array([-1.0, -2.0, -9.0]), np.array([-1.0, -1.0, -4.0]))
     assert score.as_json() == {
         "environment": "Pendulum-v1",
         "gravity": 1.0,
@@ -74,7 +68,7 @@ def test_score_computes_its_statistics() -> None:
 def score_with_discount(regret: float) -> kp.Score:
     """Returns a score for γ = 0.9 at g = 1, which costs 0.245 of the regret."""
     optimum = kp.optimal_return(1.0, range(100))
-    return kp.Score("Pendulum-v1", 1.0, optimum - regret, optimum, 0.9, range(100))
+    return kp.Score(Pendulum(), optimum - regret, optimum, 0.9, range(100))
 
 
 def test_regret_has_a_part_of_the_discount_and_one_of_learning() -> None:
@@ -101,8 +95,7 @@ def test_regret_has_a_part_of_the_discount_and_one_of_learning() -> None:
 
 def test_discount_is_the_given_one_else_the_recorded_one() -> None:
     scores = [kp.evaluate_policy("reference", 1, discount=given) for given in (None, 1, 0.9)]
-    recorded = json.loads(kp.load_weights("reference").provenance.config or "")["discount"]
-    assert [score.discount for score in scores] == [recorded, 1, 0.9]
+    assert [score.discount for score in scores] == [kp.preset("reference").discount, 1, 0.9]
     assert scores[1].discount_regret == 0
     assert kp.evaluate_policy(kp.DQN((8,)), 1).discount is None
     with pytest.raises(kp.ConfigError, match=r"^discount is 1\.5; expected a number from 0 to 1$"):
@@ -124,14 +117,14 @@ def test_return_above_the_best_one_with_41_torques_is_explained(excess: float, r
 
 
 def test_summary_has_the_same_three_lines_for_both_environments() -> None:
-    pendulum = kp.Score("Pendulum-v1", 1.0, np.array([-4.0, -2.0]), np.array([-2.5, -1.5]))
+    pendulum = kp.Score(Pendulum(), np.array([-4.0, -2.0]), np.array([-2.5, -1.5]))
     assert pendulum.summary().splitlines() == [
         "Greedy on 2 fixed starts, Pendulum-v1, g = 1: mean return -3.00 "
         "(standard deviation 1.00, median -3.00, worst -4.00)",
         "Best possible on the same starts: -2.00",
         "Regret: 1.00",
     ]
-    cartpole = kp.Score("CartPole-v1", None, np.array([500.0, 300.0]), np.array([500.0, 500.0]))
+    cartpole = kp.Score(CartPole(), np.array([500.0, 300.0]), np.array([500.0, 500.0]))
     assert cartpole.summary().splitlines() == [
         "Greedy on 2 fixed starts, CartPole-v1: mean return 400.00 "
         "(standard deviation 100.00, median 400.00, worst 300.00)",
@@ -140,23 +133,15 @@ def test_summary_has_the_same_three_lines_for_both_environments() -> None:
     ]
 
 
-def test_optimum_of_cartpole_is_500_and_null_in_json() -> None:
-    network = kp.DQN((8,), 2, observation_size=4, provenance=Provenance(environment="CartPole-v1"))
+def test_optimum_of_cartpole_is_500() -> None:
+    network = kp.DQN((8,), 2, observation_size=4, metadata={"environment": "CartPole-v1"})
     score = kp.evaluate_policy(network, 3)
     assert score.optimal_returns.tolist() == [500.0] * 3
     assert score.regret == 500 - score.mean_return
     values = score.as_json()
     assert (values["environment"], values["gravity"]) == ("CartPole-v1", None)
-    assert values["optimal_mean_return"] is values["regret"] is None
-
-
-def test_gravity_is_the_recorded_one_else_1() -> None:
-    assert kp.evaluate_policy(kp.DQN((8,)), 1).gravity == 1
-    network = kp.DQN((8,), provenance=Provenance(gravity=10.0))
-    assert kp.evaluate_policy(network, 1).gravity == 10
-    assert kp.evaluate_policy(network, 1, gravity=1).gravity == 1
-    default, light = kp.evaluate_policy(network, 1), kp.evaluate_policy(network, 1, gravity=1)
-    assert default.returns != light.returns
+    assert (values["optimal_mean_return"], values["regret"]) == (500, score.regret)
+    assert values["discount_regret"] is values["learning_regret"] is None
 
 
 def test_environment_is_closed_when_on_step_raises(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,15 +156,10 @@ def test_environment_is_closed_when_on_step_raises(monkeypatch: pytest.MonkeyPat
     assert len(closed) == 1
 
 
-def test_optimal_returns_have_the_same_starts_and_gravity() -> None:
-    score = kp.evaluate_policy(kp.DQN((8,)), 3, 5, gravity=10)
-    np.testing.assert_array_equal(score.optimal_returns, kp.optimal_return(10, [5, 6, 7]))
-
-
 def test_largest_seeds_can_be_evaluated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "keras_pendulum.evaluate.evaluation.optimal_return",
-        lambda gravity, seeds: np.zeros(len(seeds)),
+        "keras_pendulum.optimum.pendulum.optimal_return",
+        lambda gravity, seeds, steps: np.zeros(len(seeds)),
     )
     assert len(kp.evaluate_policy(kp.DQN((8,)), 2, 2**32 - 2).returns) == 2
 
@@ -188,47 +168,6 @@ def test_no_policy_exceeds_the_optimal_return() -> None:
     network = kp.load_weights(DATA / "pendulum_weight.keras2.h5")
     score = kp.evaluate_policy(network, 20)
     assert (score.returns < score.optimal_returns + 0.05).all()
-
-
-def test_random_return_is_the_published_one() -> None:
-    # -909 at g = 1 over seeds 0 to 999; the mean over 100 of them differs by less than 10 %.
-    assert random_return("Pendulum-v1", 1.0, 200) == pytest.approx(-909, rel=0.1)
-
-
-def test_random_return_equals_gymnasiums_for_the_same_torques() -> None:
-    env, random = gymnasium.make("Pendulum-v1", g=10.0), np.random.RandomState(0)
-    torques = np.linspace(-2, 2, 41)
-    total = 0.0
-    for seed in range(3):
-        env.reset(seed=seed)
-        for _ in range(200):
-            total += float(env.step([random.choice(torques)])[1])
-    assert random_return("Pendulum-v1", 10.0, 200, episodes=3) == pytest.approx(total / 3, rel=1e-9)
-
-
-def test_random_episodes_have_the_requested_number_of_steps() -> None:
-    one_step = random_return("Pendulum-v1", 1.0, 1)
-    assert one_step == pytest.approx(-(np.pi**2 / 3 + 0.1 / 3 + 0.001 * 4 / 3), rel=0.2)
-    assert random_return("CartPole-v1", None, 5) == 5  # no pole falls over within 5 steps
-
-
-@pytest.mark.parametrize(
-    ("preset", "steps", "optimum"),
-    [
-        ("reference", 200, -40.69),
-        ("swingup", 30, -117.93),
-        ("swingup", 200, -135.5),
-        ("cartpole", 500, 500),
-        ("cartpole", 60, 60),
-        ("cartpole", 900, 900),
-        ("reference", 201, np.nan),
-    ],
-)
-def test_optimal_training_return_has_the_episode_length_of_the_run(
-    preset: str, steps: int, optimum: float
-) -> None:
-    value = optimal_training_return(kp.preset(preset, max_episode_steps=steps))
-    assert value == pytest.approx(optimum, abs=0.3 if steps == 200 else 0.01, nan_ok=True)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +179,7 @@ def test_wrong_number_of_episodes_or_seed_is_refused(episodes: int, seed: int) -
 
 
 @pytest.mark.parametrize("gravity", [-1.0, float("nan"), 1e9])
-def test_wrong_gravity_is_refused_before_the_evaluation(gravity: float) -> None:
+def test_wrong_gravity_is_refused(gravity: float) -> None:
     with pytest.raises(kp.ConfigError, match="gravity"):
         kp.evaluate_policy(kp.DQN((8,)), 1, gravity=gravity)
 
@@ -257,31 +196,24 @@ def test_wrong_gravity_is_refused_before_the_evaluation(gravity: float) -> None:
         (None, 100, 100.0),
     ],
 )
-def test_evaluation_gravity_is_the_given_one_else_the_recorded_one_else_1(
-    recorded: float | None, given: float | None, gravity: float
+def test_gravity_is_the_given_one_else_the_recorded_one_else_1(
+    recorded: float | None, given: float | None, gravity: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = evaluation_gravity(Provenance(gravity=recorded), given)
-    assert (found, type(found)) == (gravity, float)
+    monkeypatch.setattr(
+        "keras_pendulum.optimum.pendulum.optimal_return", lambda *problem: np.array([problem[0]])
+    )
+    metadata = {} if recorded is None else {"gravity": recorded}
+    score = kp.evaluate_policy(kp.DQN((8,), metadata=metadata), 1, gravity=given)
+    assert (score.gravity, type(score.gravity)) == (gravity, float)
+    assert score.optimal_returns == [gravity]
+    alone = kp.evaluate_policy(kp.DQN((8,)), 1, gravity=gravity)
+    assert alone.returns == score.returns
 
 
-@pytest.mark.parametrize("gravity", [-1.0, 100.1, float("nan"), float("inf")])
-def test_evaluation_gravity_out_of_range_is_refused(gravity: float) -> None:
-    with pytest.raises(kp.ConfigError, match=r"^gravity is .* number from 0 to 100$"):
-        evaluation_gravity(Provenance(gravity=10.0), gravity)
-
-
-def test_cartpole_has_no_evaluation_gravity() -> None:
-    provenance = Provenance("CartPole-v1")
-    assert evaluation_gravity(provenance) is None
+def test_cartpole_has_no_gravity() -> None:
+    assert kp.evaluate_policy("cartpole", 1).gravity is None
     for gravity in (0.0, 1.0, float("nan")):
         with pytest.raises(
             kp.ConfigError, match=r"^gravity belongs to Pendulum-v1; CartPole-v1 has none$"
         ):
-            evaluation_gravity(provenance, gravity)
-
-
-def test_network_that_is_not_finite_is_refused() -> None:
-    network = kp.DQN((4,))
-    network.head.kernel.assign(np.full((4, 41), np.inf))
-    with pytest.raises(kp.UserError, match="a weight is not finite"):
-        kp.evaluate_policy(network, 1)
+            kp.evaluate_policy("cartpole", 1, gravity=gravity)

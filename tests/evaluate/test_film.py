@@ -16,10 +16,12 @@ import pytest
 from PIL import Image
 
 import keras_pendulum as kp
-from keras_pendulum.environments.tasks import make_environment
-from keras_pendulum.evaluate import film, film_frame, film_start
-from keras_pendulum.evaluate.film_frame import Moment, draw_frame
-from keras_pendulum.torque_colors import CLOCKWISE, COUNTERCLOCKWISE, rgb
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.environments.task import Task
+from keras_pendulum.evaluate import film, film_command
+from keras_pendulum.evaluate.film import Moment, draw_frame
+from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
 
 pytestmark = pytest.mark.quick
 
@@ -32,66 +34,101 @@ SCENE = np.full((500, 500, 3), 255, np.uint8)
     [("hanging", 180), ("upright", 0), ("90", 90), ("-12.5", -12.5), ("-180", -180)],
 )
 def test_start_is_a_name_or_an_angle(text: str, angle: float) -> None:
-    assert film_start.parse_start(text) == angle
+    assert film_command.parse_start(text) == angle
 
 
 @pytest.mark.parametrize("text", ["", "down", "nan", "inf", "180.1", "1 2"])
 def test_other_starts_are_refused(text: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError, match="expected hanging, upright, or an angle"):
-        film_start.parse_start(text)
+        film_command.parse_start(text)
 
 
 @pytest.mark.parametrize("angle", [180.0, 0.0, 90.0, -12.5])
 def test_reset_puts_the_pendulum_at_the_angle_at_rest(angle: float) -> None:
-    env: Any = make_environment("Pendulum-v1", 10.0)
-    observation = film_start.reset(env, 3, angle)
+    env: Any = Pendulum(10.0).make_env()
+    env.reset(seed=3)
+    observation = Pendulum(10.0).reset_to_angle(env, angle)
     theta = math.radians(angle)
     assert observation == pytest.approx([math.cos(theta), math.sin(theta), 0], abs=1e-6)
     assert observation.dtype == np.float32
     next_observation = env.step(np.array([0.0]))[0]
     speed = 0.05 * 15 * math.sin(theta)
     assert next_observation[2] == pytest.approx(speed, abs=1e-6)
+    with pytest.raises(
+        kp.ConfigError, match="--start belongs to Pendulum-v1; CartPole-v1 has none"
+    ):
+        CartPole().reset_to_angle(env, angle)
 
 
-def test_optimum_of_a_start_is_that_of_its_seed_or_state(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_optimum_of_a_film_is_that_of_its_seed_or_angle(monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[Any] = []
 
     def best_return(gravity: float, starts: Any, steps: int) -> Any:
         found.append((gravity, starts.tolist(), steps))
         return np.array([-7.0])
 
-    monkeypatch.setattr(film_start, "best_return", best_return)
-    optimum = film_start.optimum_of_start
-    assert optimum("Pendulum-v1", 1.0, 3, None) == kp.optimal_return(1.0, [3])[0]
-    assert optimum("CartPole-v1", None, 3, None) == 500
+    monkeypatch.setattr("keras_pendulum.optimum.best_return.best_return", best_return)
+    monkeypatch.setattr(film, "draw_frame", lambda pixels, moment: moment)
+
+    def optimum(task: Task, name: str, angle: float | None = None) -> Any:
+        moment: Any = next(film.film_episode(kp.load_policy(name), task, ("", ""), 3, angle))
+        return moment.optimum
+
+    assert optimum(Pendulum(), "reference") == kp.optimal_return(1.0, [3])[0]
+    assert optimum(CartPole(), "cartpole") == 500
     assert found == []
-    assert optimum("Pendulum-v1", 2.0, 3, 180.0) == -7
+    assert optimum(Pendulum(2.0), "reference", 180.0) == -7
     assert found == [(2.0, [[math.pi, 0.0]], 200)]
 
 
 def test_film_shows_each_step_with_the_return_of_the_evaluation(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     moments: list[Moment] = []
 
     def record(pixels: Any, moment: Moment) -> Image.Image:
         moments.append(moment)
-        return Image.new("RGB", (2, 2))
+        return Image.new("RGB", (2, 2), (moment.step, 0, 0))
 
     monkeypatch.setattr(film, "draw_frame", record)
     policy = kp.load_policy("reference")
-    pictures = list(film.film_episode(policy, "Pendulum-v1", 1.0, name="mine", seed=5))
+    shown: list[int] = []
+
+    def encode(pictures: list[Image.Image]) -> bytes:
+        shown.extend(picture.getpixel((0, 0))[0] for picture in pictures)  # type: ignore[index]
+        return b""
+
+    monkeypatch.setattr(film_command, "encode_gif", encode)
+    arguments = argparse.Namespace(gif=tmp_path / "film.gif", video=None, start=None, seed=5)
+    film_command.make_films(arguments, policy, Pendulum(), "mine")
     score = kp.evaluate_policy(policy, 1, seed=5)
-    assert len(pictures) == 201
     assert [moment.step for moment in moments] == list(range(201))
     assert moments[0].titles == ("mine, g = 1 m/s²", "start of seed 5")
     assert moments[-1].total == pytest.approx(score.mean_return)
     assert moments[-1].optimum == score.optimal_mean_return
-    first = policy(np.asarray(make_environment("Pendulum-v1", 1.0).reset(seed=5)[0]))
+    first = policy(np.asarray(Pendulum().make_env().reset(seed=5)[0]))
     assert moments[1].torque == first[0]
-    shown = film.shown_in_gif(pictures, 0.05)
-    assert len(shown) == 101
-    assert shown[-1] is pictures[-1]
+    # A GIF shows each second step, and the last one.
+    assert shown == list(range(0, 201, 2))
+
+
+@pytest.mark.parametrize(
+    ("angle", "title"),
+    [(180.0, "start: hanging"), (0.0, "start: upright"), (-12.5, "start: -12.5°")],
+)
+def test_film_names_its_start(
+    angle: float, title: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    titles: list[tuple[str, str]] = []
+
+    def film_episode(*words: Any) -> list[Image.Image]:
+        titles.append(words[2])
+        return [Image.new("RGB", (2, 2))]
+
+    monkeypatch.setattr(film, "film_episode", film_episode)
+    arguments = argparse.Namespace(gif=tmp_path / "film.gif", video=None, start=angle, seed=0)
+    film_command.make_films(arguments, kp.load_policy("swingup"), Pendulum(10.0), "swingup")
+    assert titles == [("swingup, g = 10 m/s²", title)]
 
 
 def test_frame_is_cropped_and_shows_the_torque() -> None:
@@ -150,14 +187,14 @@ def test_numbers_of_a_frame_have_no_negative_zero(monkeypatch: pytest.MonkeyPatc
 
 def test_gif_loops_with_the_pictures() -> None:
     pictures = [Image.new("RGB", (4, 4), color) for color in ("red", "blue", "red")]
-    with Image.open(io.BytesIO(film.encode_gif(pictures))) as gif:
+    with Image.open(io.BytesIO(film_command.encode_gif(pictures))) as gif:
         assert (gif.n_frames, gif.info["duration"], gif.info["loop"]) == (3, 100, 0)  # type: ignore[attr-defined]
 
 
 def test_video_without_ffmpeg_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(kp.UserError, match="--video needs the program ffmpeg: install it"):
-        film.find_ffmpeg()
+        film_command.find_ffmpeg()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for ffmpeg is a script")
@@ -172,10 +209,10 @@ def test_ffmpeg_gets_the_pictures_and_its_failure_is_one_line(works: bool, tmp_p
     pictures = [Image.new("RGB", (4, 6))] * 3
     if not works:
         with pytest.raises(kp.UserError, match=r"^ffmpeg failed: first.*second$") as caught:
-            film.encode_mp4(str(program), pictures, 0.05)
+            film_command.encode_mp4(str(program), pictures, 0.05)
         assert "\n" not in str(caught.value)
         return
-    words = film.encode_mp4(str(program), pictures, 0.05).decode().split()
+    words = film_command.encode_mp4(str(program), pictures, 0.05).decode().split()
     assert "4x6" in words
     assert words[words.index("-r") + 1] == "20"
     assert words[-1] == str(3 * 4 * 6 * 3)
@@ -183,5 +220,5 @@ def test_ffmpeg_gets_the_pictures_and_its_failure_is_one_line(works: bool, tmp_p
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_video_is_an_mp4() -> None:
-    pictures = [Image.new("RGB", (film_frame.WIDTH, 448), color) for color in ("red", "blue")]
-    assert film.encode_mp4(film.find_ffmpeg(), pictures, 0.05)[4:8] == b"ftyp"
+    pictures = [Image.new("RGB", (320, 448), color) for color in ("red", "blue")]
+    assert film_command.encode_mp4(film_command.find_ffmpeg(), pictures, 0.05)[4:8] == b"ftyp"

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.dqn.network import DQN, Provenance
+from keras_pendulum.dqn.network import DQN
+from keras_pendulum.environments.pendulum import Pendulum
 
 pytestmark = pytest.mark.quick
 
@@ -29,17 +30,17 @@ CALLS: dict[str, Callable[[kp.Policy, Any], Any]] = {
 
 
 def pendulum_policy(seed: int = 1) -> kp.Policy:
-    return kp.Policy(kp.DQN((8,), seed=seed))
+    return kp.load_policy(kp.DQN((8,), seed=seed))
 
 
 def cartpole_policy() -> kp.Policy:
-    provenance = Provenance("CartPole-v1")
-    return kp.Policy(kp.DQN((8,), 2, observation_size=4, seed=1, provenance=provenance))
+    metadata = {"environment": "CartPole-v1"}
+    return kp.load_policy(kp.DQN((8,), 2, observation_size=4, seed=1, metadata=metadata))
 
 
 def test_torque_is_that_of_the_highest_q_value_as_the_environment_takes_it() -> None:
     network = kp.DQN((64, 32), seed=1)
-    policy = kp.Policy(network)
+    policy = kp.load_policy(network)
     indices = network(PENDULUM).numpy().argmax(axis=1)
     assert len(set(indices)) > 3
     for observation, index in zip(PENDULUM, indices, strict=True):
@@ -63,7 +64,7 @@ def test_action_of_cartpole_is_an_index() -> None:
 
 def test_q_values_are_those_of_the_network() -> None:
     network = kp.DQN((64, 32), activation="relu,linear")
-    policy = kp.Policy(network)
+    policy = kp.load_policy(network)
     expected = network(PENDULUM).numpy()
     np.testing.assert_allclose(policy.q_values(PENDULUM), expected, atol=1e-6)
     np.testing.assert_allclose(policy.q_values(PENDULUM[0]), expected[0], atol=1e-6)
@@ -137,7 +138,7 @@ def test_wrong_observation_is_refused_in_one_line(
 
 def test_later_changes_of_the_network_do_not_change_its_policy() -> None:
     network = kp.DQN((8,))
-    policy = kp.Policy(network)
+    policy = kp.load_policy(network)
     before = policy.q_values(PENDULUM)
     network.set_weights([np.zeros_like(weights) for weights in network.get_weights()])
     np.testing.assert_array_equal(policy.q_values(PENDULUM), before)
@@ -162,43 +163,31 @@ def test_policy_calls_no_network(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 @pytest.mark.parametrize("activation", ["tanh", "relu", "linear"])
 def test_copy_is_an_equal_policy(copied: Callable[[Any], Any], activation: str) -> None:
-    policy = kp.Policy(kp.DQN((8,), activation=activation, provenance=Provenance(gravity=3.0)))
+    policy = kp.load_policy(kp.DQN((8,), activation=activation, metadata={"gravity": 3.0}))
     copy = copied(policy)
     np.testing.assert_array_equal(copy.q_values(PENDULUM), policy.q_values(PENDULUM))
-    assert copy.provenance == policy.provenance
+    assert copy.info == policy.info
 
 
 def test_network_that_is_not_finite_and_other_objects_have_no_policy() -> None:
     network = kp.DQN((4,))
     network.head.bias.assign(np.full(41, np.nan))
     with pytest.raises(kp.UserError, match="a weight is not finite"):
-        kp.Policy(network)
-    with pytest.raises(TypeError, match="network is 'reference'; expected DQN"):
-        kp.Policy("reference")  # type: ignore[arg-type]
+        kp.load_policy(network)
+    with pytest.raises(TypeError, match="path is 3; expected str or PathLike"):
+        kp.load_policy(3)  # type: ignore[arg-type]
 
 
 def test_load_policy_takes_a_path_or_a_shipped_name() -> None:
     by_name, by_path = kp.load_policy("swingup"), kp.load_policy(kp.find_weights("swingup"))
-    assert by_name.provenance == by_path.provenance
-    assert (by_name.provenance.preset, by_name.provenance.gravity) == ("swingup", 10.0)
+    assert by_name.info == by_path.info
+    assert (by_name.info.preset, by_name.info.task) == ("swingup", Pendulum(10.0))
     np.testing.assert_array_equal(by_name.q_values(PENDULUM), by_path.q_values(PENDULUM))
     assert kp.load_policy("cartpole")(CARTPOLE[0]) in (0, 1)
     with pytest.raises(kp.WeightsError, match="nonsense: no such file"):
         kp.load_policy("nonsense")
     with pytest.raises(kp.WeightsError, match="records the activation tanh, not relu"):
         kp.load_policy("swingup", activation="relu")
-
-
-def test_plain_loop_on_gymnasium_has_the_returns_of_evaluate_policy() -> None:
-    policy = pendulum_policy()
-    env = gymnasium.make("Pendulum-v1", g=1.0)
-    for start in range(2):
-        observation, _ = env.reset(seed=start)
-        total, truncated = 0.0, False
-        while not truncated:
-            observation, reward, _, truncated, _ = env.step(policy(observation))
-            total += float(reward)
-        assert kp.evaluate_policy(policy, 1, start).returns.tolist() == [total]
 
 
 @pytest.mark.parametrize("environments", [1, 3])
@@ -208,8 +197,8 @@ def test_policy_follows_the_protocol_of_stable_baselines3(
 ) -> None:
     """Makes the calls of Stable-Baselines3's `evaluate_policy`, which need not be installed."""
     policy = make_policy()
-    name = policy.provenance.environment
-    physics: dict[str, Any] = {"g": 1.0} if name == "Pendulum-v1" else {}
+    name = policy.task.environment
+    physics = policy.task.physics
     env = gymnasium.make_vec(name, environments, vectorization_mode="sync", **physics)
     observations, _ = env.reset(seed=5)
     states = None
@@ -237,9 +226,8 @@ def test_evaluate_policy_of_stable_baselines3_gives_the_same_returns(name: str) 
     from stable_baselines3.common.evaluation import evaluate_policy
 
     policy = kp.load_policy(name)
-    provenance = policy.provenance
-    physics = {} if provenance.gravity is None else {"g": provenance.gravity}
-    env = make_vec_env(provenance.environment, n_envs=1, seed=0, env_kwargs=physics)
+    task = policy.task
+    env = make_vec_env(task.environment, n_envs=1, seed=0, env_kwargs=task.physics)
     returns, lengths = evaluate_policy(policy, env, 1, return_episode_rewards=True)
     score = kp.evaluate_policy(policy, 1, 0)
     assert returns == pytest.approx(score.returns, abs=1e-5)  # Monitor rounds to 6 decimals

@@ -9,7 +9,7 @@ import pytest
 from conftest import Command
 
 import keras_pendulum as kp
-from keras_pendulum.evaluate.user_code import names_code
+from keras_pendulum.evaluate.named_policy import names_code
 
 CODE = """
 import keras

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.optimum import optimal_return as module
-from keras_pendulum.optimum.optimal_return import best_return, optimal_return
+from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.optimum import best_return as module
+from keras_pendulum.optimum.best_return import best_return
+from keras_pendulum.optimum.optimal_return import optimal_return
 from keras_pendulum.optimum.value_iteration import greedy_return, solve, value_tables
 
 Array = NDArray[np.float64]
@@ -23,9 +25,7 @@ def pendulum(gravity: float) -> Any:
 
 
 def starts(count: int) -> Array:
-    """Returns the states [count, 2] (θ, θ̇) of the reset seeds from 0 on."""
-    env = pendulum(1.0)
-    return np.array([(env.reset(seed=seed), env.state)[1] for seed in range(count)])
+    return pendulum_starts(range(count))
 
 
 def gymnasium_return(env: Any, start: Array, torques: list[float]) -> float:
@@ -221,27 +221,27 @@ def test_wrong_gravity_is_refused_in_one_line(gravity: Any) -> None:
     assert "\n" not in str(info.value)
 
 
-@pytest.mark.parametrize("seed", [-1, 2**32])
-def test_wrong_seed_is_refused(seed: int) -> None:
-    with pytest.raises(ValueError, match=f"seed is {seed}; expected 0 to"):
-        optimal_return(1.0, [seed])
-
-
-@pytest.mark.parametrize("steps", [-1, 0, 201])
-def test_wrong_number_of_steps_is_refused(steps: int) -> None:
-    with pytest.raises(ValueError, match=f"steps is {steps}; expected 1 to 200"):
-        optimal_return(1.0, [0], steps)
-
-
-def test_default_is_100_starts_of_200_steps_at_gravity_1() -> None:
-    np.testing.assert_array_equal(optimal_return(), optimal_return(1.0, range(100), 200))
+@pytest.mark.parametrize(
+    ("seed", "steps", "problem"),
+    [
+        (-1, 200, "seed is -1; expected a whole number from 0 to"),
+        (2**32, 200, "seed is 4294967296; expected a whole number from 0 to"),
+        (0.5, 200, "seed is 0.5; expected a whole number"),
+        (0, 0, "steps is 0; expected a whole number from 1 to 200"),
+        (0, 201, "steps is 201; expected a whole number from 1 to 200"),
+    ],
+)
+def test_wrong_seed_or_number_of_steps_is_refused(seed: Any, steps: int, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        optimal_return(1.0, [seed], steps)
 
 
 def test_seeds_are_accepted_in_any_order_repeated_and_empty(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    first = optimal_return(1.0, range(10))
+    first = optimal_return(1.0, range(100), 200)
+    np.testing.assert_array_equal(optimal_return(), first)
     np.testing.assert_array_equal(optimal_return(1.0, iter([7, 2, 7])), first[[7, 2, 7]])
     assert optimal_return(1.0, np.arange(3)).tolist() == first[:3].tolist()
     assert optimal_return(1.0, []).shape == (0,)

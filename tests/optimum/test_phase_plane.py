@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.optimum import phase_plane
 from keras_pendulum.optimum.phase_plane import (
     EXTENT,
@@ -68,7 +68,7 @@ def test_optimal_values_are_the_returns_of_the_optimal_torques(
     assert plane.value[UPRIGHT, UPRIGHT] == pytest.approx(0, abs=1e-4)
     np.testing.assert_allclose(plane.value, plane.value[::-1, ::-1], atol=2e-2)
     # The torques, applied from a horizontal start at rest, attain the start's value.
-    env: Any = make_environment("Pendulum-v1", gravity).unwrapped
+    env: Any = Pendulum(gravity).make_env().unwrapped
     env.reset(seed=0)
     env.state = np.array([math.pi / 2, 0.0])
     value = plane.value[UPRIGHT, np.abs(THETA - math.pi / 2).argmin()]
@@ -91,7 +91,7 @@ def test_optimal_values_are_the_returns_of_the_optimal_torques(
 def test_shipped_networks_have_nearly_the_optimal_values_up_to_an_offset(
     name: str, discount: float, max_offset: float, max_error: float
 ) -> None:
-    planes = run_phase_planes(kp.load_weights(kp.find_weights(name)), kp.preset(name))
+    planes = run_phase_planes(kp.load_weights(name), kp.preset(name))
     assert list(planes) == ["This policy", f"Exact optimum for γ = {discount}"]
     learned, optimal = planes.values()
     visited = np.abs(SPEED) < 4

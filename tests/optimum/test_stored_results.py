@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.optimum import return_cache
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.optimum.optimal_return import optimal_return
+from keras_pendulum.optimum.stored_results import Problem, read_returns, write
 
 pytestmark = pytest.mark.quick
 Array = NDArray[np.float64]
@@ -30,7 +33,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         counts.append(len(starts))
         return np.asarray(-gravity - np.abs(starts[:, 0]) - 1 / steps)
 
-    monkeypatch.setattr("keras_pendulum.optimum.optimal_return.best_return", fast_return)
+    monkeypatch.setattr("keras_pendulum.optimum.best_return.best_return", fast_return)
     return counts
 
 
@@ -41,14 +44,16 @@ def archive(**changes: Any) -> bytes:
         "returns": np.full(1000, -7.0),
     }
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **{**arrays, **changes})
+    arrays |= changes
+    np.savez_compressed(
+        buffer, **{key: array for key, array in arrays.items() if array is not None}
+    )
     return buffer.getvalue()
 
 
-def archive_without_returns() -> bytes:
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, gravity=np.float64(9.81), seeds=np.arange(1000))
-    return buffer.getvalue()
+def write_returns(path: Path, problem: Problem, returns: dict[int, float]) -> None:
+    values = np.array(list(returns.values()))
+    write(path, problem, seeds=np.array(list(returns)), returns=values)
 
 
 def test_returns_are_computed_once_and_stored_with_later_seeds(
@@ -92,18 +97,39 @@ LOWEST = {1: -16.2736044, 60: -976.416264, 200: -3254.72088}  # by steps
 def test_returns_between_the_lowest_possible_one_and_0_are_plausible(
     steps: int, share: float, plausible: bool, tmp_path: Path
 ) -> None:
-    path, value = tmp_path / "a.npz", share * LOWEST[steps]
+    path, value, problem = tmp_path / "a.npz", share * LOWEST[steps], Problem.valid(1.0, steps)
     for returns in ({0: value}, {0: -1.0, 1: value, 2: -2.0}):
-        return_cache.write(path, 1.0, steps, returns=returns)
-        assert return_cache.read(path, 1.0, steps) == (returns if plausible else {})
+        write_returns(path, problem, returns)
+        assert read_returns(path, problem) == (returns if plausible else {})
 
 
 def test_bounds_of_plausible_returns_are_plausible_themselves(tmp_path: Path) -> None:
-    path, lowest = tmp_path / "a.npz", 200 * return_cache.LOWEST_REWARD
-    return_cache.write(path, 1.0, 200, returns={0: lowest, 1: 0.0})
-    assert return_cache.read(path, 1.0, 200) == {0: lowest, 1: 0.0}
-    return_cache.write(path, 1.0, 200, returns={0: float(np.nextafter(lowest, -np.inf))})
-    assert return_cache.read(path, 1.0, 200) == {}
+    path, lowest, problem = tmp_path / "a.npz", 200 * Pendulum.reward_range[0], Problem.valid(1.0)
+    write_returns(path, problem, {0: lowest, 1: 0.0})
+    assert read_returns(path, problem) == {0: lowest, 1: 0.0}
+    write_returns(path, problem, {0: float(np.nextafter(lowest, -np.inf))})
+    assert read_returns(path, problem) == {}
+
+
+@pytest.mark.parametrize(
+    ("problem", "name"),
+    [
+        (Problem.valid(10), "gravity_10.npz"),
+        (Problem.valid(9.81, 60), "gravity_9.81_steps_60.npz"),
+        (Problem.valid(-0.0, 60, 0.5), "gravity_0_steps_60_discount_0.5.npz"),
+        (Problem.valid(1, discount=-0.0), "gravity_1_discount_0.npz"),
+    ],
+)
+def test_name_of_a_file_says_what_departs_from_the_usual(problem: Problem, name: str) -> None:
+    assert problem.file_name == name
+
+
+def test_file_belongs_to_one_problem(tmp_path: Path) -> None:
+    problem = Problem.valid(1.0, 60, 0.9)
+    write_returns(tmp_path / "a.npz", problem, {3: -7.0})
+    assert read_returns(tmp_path / "a.npz", problem) == {3: -7.0}
+    for change in ({"gravity": 1.1}, {"steps": 61}, {"discount": 0.8}):
+        assert read_returns(tmp_path / "a.npz", problem._replace(**change)) == {}
 
 
 @pytest.mark.parametrize(
@@ -127,7 +153,7 @@ def test_bounds_of_plausible_returns_are_plausible_themselves(tmp_path: Path) ->
         archive(seeds=np.arange(1000.0)),
         archive(seeds=np.zeros((1000, 1), np.int64), returns=np.full((1000, 1), -7.0)),
         archive(seeds=np.int64(4), returns=np.float64(-7)),
-        archive_without_returns(),
+        archive(returns=None),
     ],
 )
 def test_damaged_or_foreign_cache_is_computed_again_and_replaced(
@@ -153,7 +179,7 @@ class MakesAFile:
 def test_nothing_in_a_cache_is_unpickled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("a.npz").write_bytes(archive(returns=np.array([MakesAFile()])))
-    assert return_cache.read(Path("a.npz"), 9.81, 200) == {}
+    assert read_returns(Path("a.npz"), Problem.valid(9.81)) == {}
     assert not Path("made").exists()
 
 
@@ -176,17 +202,16 @@ def test_cache_of_another_episode_length_is_computed_again(
     assert computed == [1000]
 
 
-@pytest.mark.parametrize("steps", [60, 200])
-def test_file_with_a_flipped_bit_never_gives_another_return(steps: int, tmp_path: Path) -> None:
-    path = tmp_path / "gravity_9.81.npz"
+def test_file_with_a_flipped_bit_never_gives_another_return(tmp_path: Path) -> None:
+    path, problem = tmp_path / "gravity_9.81.npz", Problem.valid(9.81, 60)
     returns = {seed: -seed / 7 for seed in range(10)}
-    return_cache.write(path, 9.81, steps, returns=returns)
+    write_returns(path, problem, returns)
     valid = path.read_bytes()
     for position in range(len(valid)):
         data = bytearray(valid)
         data[position] ^= 0x01
         path.write_bytes(data)
-        assert return_cache.read(path, 9.81, steps) in ({}, returns)
+        assert read_returns(path, problem) in ({}, returns)
 
 
 def test_unwritable_cache_folder_is_ignored(
@@ -214,3 +239,13 @@ def test_returns_are_computed_for_a_user_without_a_home_folder(
     first, second = (optimal_return(9.81, range(5)) for _ in range(2))
     np.testing.assert_array_equal(first, second)
     assert computed == [1000, 1000]  # without a cache folder, each call computes
+
+
+def test_stored_returns_are_read_without_heavy_imports() -> None:
+    code = (
+        "import sys\n"
+        "from keras_pendulum.optimum.optimal_return import optimal_return\n"
+        "optimal_return()\n"
+        "assert not {'tensorflow', 'keras', 'gymnasium', 'matplotlib'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,127 @@
+"""The pendulum: Gymnasium's `Pendulum-v1` at any gravity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.errors import ConfigError
+
+if TYPE_CHECKING:
+    import gymnasium
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from keras_pendulum.environments.actions import TorqueGrid
+
+STEPS_PER_EPISODE = 200
+MAX_SPEED = 8.0  # rad/s
+LARGEST_GRAVITY = 100.0  # m/s²
+
+
+@dataclass(frozen=True)
+class Pendulum(Task):
+    """A pendulum that a torque swings up. It never terminates.
+
+    The observation is [cos θ, sin θ, θ̇ in rad/s], θ = 0 upright. The action is [u], a torque in
+    N·m. The reward is -(θ² + 0.1 θ̇² + 0.001 u²). Raises ConfigError for a gravity out of range.
+    """
+
+    gravity: float = 1.0  # m/s², 0 to 100; Gymnasium's own default is 10
+
+    environment: ClassVar[str] = "Pendulum-v1"
+    observation_names: ClassVar[tuple[str, ...]] = ("cos θ", "sin θ", "θ̇")
+    steps_per_episode: ClassVar[int] = STEPS_PER_EPISODE
+    never_terminates: ClassVar[bool] = True
+    reward_range: ClassVar[tuple[float, float]] = (
+        -(math.pi**2 + 0.1 * MAX_SPEED**2 + 0.001 * MAX_TORQUE**2),
+        0.0,
+    )
+    seconds_per_step: ClassVar[float] = 0.05
+    weights_name: ClassVar[str] = "pendulum_weight.h5"
+    has_exact_values: ClassVar[bool] = True
+    own_settings: ClassVar[tuple[str, ...]] = ("gravity", "torque_count", "stored_index")
+    curve_column: ClassVar[str] = "average_reward"
+    curve_label: ClassVar[str] = "Reward per step"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gravity", validate_gravity(self.gravity))
+
+    @property
+    def name(self) -> str:
+        """The environment and its gravity."""
+        return f"{self.environment}, g = {self.gravity:g}"
+
+    @property
+    def physics(self) -> dict[str, Any]:
+        """The gravity."""
+        return {"g": self.gravity}
+
+    def actions(self, count: int | None = None) -> TorqueGrid:
+        """Returns `count` evenly spaced torques; None stands for 41."""
+        from keras_pendulum.environments.actions import TorqueGrid
+
+        return TorqueGrid(count or 41)
+
+    def action_count(self, count: int) -> int:
+        """Returns the number of torques."""
+        return count
+
+    def with_gravity(self, gravity: float | None) -> Pendulum:
+        """Returns the pendulum with another gravity. Raises ConfigError for one out of range."""
+        return self if gravity is None else Pendulum(gravity)
+
+    def curve_value(self, episode_return: float, steps: float) -> float:
+        """Returns the reward per step."""
+        return episode_return / steps
+
+    def torque_of(self, action: Any) -> float:
+        """Returns the torque in N·m."""
+        import numpy as np
+
+        return float(np.reshape(action, -1)[0])
+
+    def reset_to_angle(self, env: gymnasium.Env[Any, Any], angle: float) -> NDArray[np.float32]:
+        """Sets the pendulum to rest at an angle in degrees; returns the observation [3]."""
+        import numpy as np
+
+        theta = math.radians(angle)
+        env.unwrapped.state = np.array([theta, 0.0])  # type: ignore[attr-defined]
+        return np.array([math.cos(theta), math.sin(theta), 0.0], np.float32)
+
+
+def validate_gravity(gravity: float) -> float:
+    """Returns the gravity in m/s² as a float. Raises ConfigError unless it is 0 to 100."""
+    try:
+        number = float(gravity)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not 0 <= number <= LARGEST_GRAVITY:  # written so that NaN fails too
+        raise ConfigError(f"gravity is {gravity!r}; expected a number from 0 to 100 (m/s²)")
+    return number + 0.0  # -0.0 becomes 0.0
+
+
+def require_pendulum(task: Task, what: str, expected: str = "expected Pendulum-v1") -> Pendulum:
+    """Returns the task if it is a pendulum.
+
+    Raises ConfigError for another task. `what` belongs to it, such as a file.
+    """
+    if not isinstance(task, Pendulum):
+        raise ConfigError(f"{what} belongs to {task.environment}; {expected}")
+    return task
+
+
+def pendulum_starts(seeds: Iterable[int]) -> NDArray[np.float64]:
+    """Returns the states [N, 2] (θ in rad, θ̇ in rad/s) of `reset(seed=…)` for N seeds."""
+    import numpy as np
+
+    env = Pendulum().make_env().unwrapped
+    states = []
+    for seed in seeds:
+        env.reset(seed=seed)
+        states.append(env.state)  # type: ignore[attr-defined]
+    return np.array(states, np.float64).reshape(-1, 2)

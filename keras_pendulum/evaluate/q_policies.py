@@ -1,0 +1,138 @@
+"""Policies that take the action with the highest Q-value, whichever library computes it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from keras_pendulum.dqn.network import DQN
+from keras_pendulum.dqn.policy import GreedyPolicy
+from keras_pendulum.environments.actions import Actions, TorqueActions, torque_actions
+from keras_pendulum.errors import ConfigError, require_finite
+from keras_pendulum.evaluate.answers import call_agent, is_instance, name_of, q_values_of
+from keras_pendulum.evaluate.policy import Observations, Policy
+from keras_pendulum.storage.run_info import RunInfo
+
+# Two states to try an agent with, one with each sign.
+_EXAMPLES = np.array([[1, 0, 0.5], [-0.6, -0.8, -3]], np.float32)  # [2, 3]
+
+
+class DQNPolicy(Policy):
+    """The greedy policy of a DQN, computed by NumPy without a call into TensorFlow.
+
+    Args:
+        network: the network.
+        name: for messages; None takes its preset.
+
+    Raises UserError when a weight is not finite.
+    """
+
+    has_q_values = True
+    one_by_one = True
+
+    def __init__(self, network: DQN, name: str | None = None) -> None:
+        self.weights = network.get_weights()  # copies
+        self.activation = network.activation
+        require_finite(self.weights)
+        info = RunInfo.from_record(network.metadata)
+        super().__init__(name or info.preset or "DQN", info)
+        self.actions: Actions = self.task.actions(network.action_count)
+        self._greedy = GreedyPolicy(self.weights, self.activation)
+
+    def with_torques(self, torques: ArrayLike) -> DQNPolicy:
+        """Returns the policy with other torques (N·m) for its outputs."""
+        if not isinstance(self.actions, TorqueActions):
+            raise ConfigError(f"torques belong to Pendulum-v1; {self.task.environment} has none")
+        changed = copy.copy(self)
+        changed.actions = torque_actions(torques, self.actions.count)
+        return changed
+
+    def q_values(self, observations: ArrayLike) -> NDArray[np.float32]:
+        """Returns the Q-value of each action: [B, A], or [A] for one observation."""
+        return self._greedy.q_values(self._validate(observations))
+
+    def act(self, observations: Observations) -> NDArray[Any]:
+        """Returns the actions with the highest Q-values."""
+        indices = self._greedy.q_values(observations).argmax(axis=1)
+        return self.actions.values.take(indices, axis=0)
+
+    def action(self, observation: NDArray[np.float32]) -> Any:
+        """Returns the action with the highest Q-value for one observation [D]."""
+        return self.actions.to_env_action(self._greedy.action(observation))
+
+
+class QPolicy(Policy):
+    """The greedy policy of a function from observations [B, 3] to Q-values [B, A].
+
+    Its arguments and errors are those of `q_function`.
+    """
+
+    has_q_values = True
+
+    def __init__(
+        self, function: Callable[[Any], Any], torques: ArrayLike | None, name: str
+    ) -> None:
+        count = q_values_of(call_agent(function, _EXAMPLES), len(_EXAMPLES)).shape[1]
+        super().__init__(name)
+        self.actions: Actions = torque_actions(torques, count)
+        self._function = function
+
+    def q_values(self, observations: ArrayLike) -> NDArray[Any]:
+        """Returns the Q-values [B, A] of observations [B, 3].
+
+        Raises ActionError when the function raises an exception or returns anything else.
+        """
+        array = np.asarray(observations, np.float32)
+        return q_values_of(call_agent(self._function, array), len(array), self.actions.count)
+
+    def act(self, observations: Observations) -> NDArray[Any]:
+        """Returns the actions with the highest Q-values."""
+        return self.actions.values.take(self.q_values(observations).argmax(axis=1), axis=0)
+
+
+def q_function(
+    function: Callable[[Any], Any], torques: ArrayLike | None = None, name: str | None = None
+) -> Policy:
+    """Returns a policy for `evaluate_policy` from a function of Q-values.
+
+    Args:
+        function: gets observations, float32 [B, 3], as a NumPy array, and returns Q-values [B, A]
+            as an array of NumPy, PyTorch, TensorFlow or JAX. A `torch.nn.Module` gets a tensor on
+            its own device, in its evaluation mode and without gradients.
+        torques: N·m, one for each output, -2 to 2; None takes `linspace(-2, 2, A)`.
+        name: for messages; None takes the function's.
+
+    Raises ConfigError for wrong torques. Raises UserError when the function cannot be called so, or
+    returns anything else.
+
+    >>> policy = kp.q_function(lambda observations: observations, torques=[-2, 0, 2])
+    >>> kp.evaluate_policy(policy, episodes=1).regret > 100
+    True
+    """
+    if not callable(function):
+        raise TypeError(f"function is {function!r}; expected a function of observations")
+    call = _torch_call(function) if is_instance(function, "torch.nn", "Module") else function
+    return QPolicy(call, torques, name or name_of(function))
+
+
+def _torch_call(module: Any) -> Callable[[NDArray[np.float32]], Any]:
+    """Returns a function that calls a PyTorch module and leaves its modes as they were."""
+    import torch
+
+    weights = next(module.parameters(), torch.empty(0, dtype=torch.float32))
+
+    def call(observations: NDArray[np.float32]) -> Any:
+        modes = [(part, part.training) for part in module.modules()]
+        module.eval()
+        try:
+            with torch.no_grad():
+                return module(torch.tensor(observations).to(weights))
+        finally:
+            for part, training in modes:
+                part.training = training
+
+    return call

@@ -1,0 +1,107 @@
+"""The policy that an object or a file stands for."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import keras
+from numpy.typing import ArrayLike
+
+from keras_pendulum.dqn.network import DQN
+from keras_pendulum.errors import ConfigError, UnknownLayersError, UserError, WeightsError, one_line
+from keras_pendulum.evaluate.answers import is_instance
+from keras_pendulum.evaluate.policy import Policy
+from keras_pendulum.evaluate.q_policies import DQNPolicy, QPolicy
+from keras_pendulum.evaluate.torque_policies import FunctionPolicy, PredictPolicy, has_predict
+from keras_pendulum.storage.find_weights import find_weights
+from keras_pendulum.storage.load_weights import load_weights
+
+_EXPECTED = (
+    "expected a DQN, a Policy, a path, a Keras model, kp.q_function(...), a function from an "
+    "observation to a torque, or an object with predict(observation, deterministic=True)"
+)
+
+
+def load_policy(source: DQN | str | os.PathLike[str], activation: str | None = None) -> Policy:
+    """Returns the greedy policy of a network.
+
+    Args:
+        source: the path or shipped name of a weights file, or a DQN.
+        activation: of a file that records none, see `load_weights`.
+
+    Raises WeightsError as `load_weights` does, and UserError when a weight is not finite.
+
+    >>> policy = kp.load_policy("reference")
+    >>> policy([-1.0, 0.0, 0.0]).shape  # hanging at rest; a torque in N·m
+    (1,)
+    """
+    return DQNPolicy(source if isinstance(source, DQN) else load_weights(source, activation))
+
+
+def as_policy(source: Any, torques: ArrayLike | None = None, name: str | None = None) -> Policy:
+    """Returns the policy that an object stands for.
+
+    Args:
+        source: a `DQN`, or the path or shipped name of its file; a Keras model from observations
+            [B, 3] to Q-values [B, A], or its `.keras` file; a `q_function`; a function from an
+            observation [3] to a torque in N·m; an object with Stable-Baselines3's `predict`; a
+            Policy.
+        torques: N·m, what the outputs or indices stand for, -2 to 2; None takes
+            `linspace(-2, 2, A)`.
+        name: of the policy; None takes that of the source.
+
+    Raises TypeError for another object, ConfigError for wrong torques, WeightsError for a wrong
+    file, and UserError for a Keras model without weights or with other outputs.
+    """
+    if isinstance(source, (str, os.PathLike)):
+        return as_policy(load_keras_file(source), torques, os.fspath(source))
+    if isinstance(source, DQN):
+        source = DQNPolicy(source, name)
+    if isinstance(source, Policy):
+        return source if torques is None else source.with_torques(torques)
+    if isinstance(source, keras.Model) or is_instance(source, "tf_keras", "Model"):
+        if not source.built:
+            raise UserError("the Keras model has no weights yet: build it or load them first")
+        return QPolicy(partial(source, training=False), torques, name or source.name)
+    if isinstance(source, type):
+        raise TypeError(one_line(f"agent is the class {source.__name__}; {_EXPECTED}"))
+    if has_predict(source):
+        return PredictPolicy(source, torques)
+    if is_instance(source, "torch.nn", "Module"):
+        raise TypeError("agent is a PyTorch module; give kp.q_function(module, torques=...)")
+    if not callable(source):
+        raise TypeError(one_line(f"agent is {source!r}; {_EXPECTED}"))
+    if torques is not None:
+        raise ConfigError("torques are given, but the agent is a function that returns torques")
+    return FunctionPolicy(source)
+
+
+def load_keras_file(
+    path: str | os.PathLike[str], activation: str | None = None
+) -> DQN | keras.Model:
+    """Returns the network in a file.
+
+    A chain of Dense layers is read by `load_weights`, with the same arguments and errors. A whole
+    model with other layers, in a `.keras` file, is read by Keras in its safe mode, which runs no
+    code of the file. Before, the file has passed the checks of `load_weights` up to the kind of its
+    layers. Raises WeightsError when Keras cannot read it.
+    """
+    try:
+        return load_weights(path, activation)
+    except UnknownLayersError as unknown:
+        file = find_weights(path)
+        if Path(file).suffix.lower() != ".keras":
+            raise UnknownLayersError(f"{unknown}; save other models as .keras") from unknown
+        try:
+            model = keras.saving.load_model(file, compile=False, safe_mode=True)
+        except Exception as error:  # which one depends on what the file lacks
+            raise WeightsError(
+                f"{file}: Keras cannot load it ({type(error).__name__}: {error}); for a model with "
+                "code of its own, give file.py:name"
+            ) from error
+    if not isinstance(model, keras.Model):
+        raise WeightsError(f"{file}: holds a {type(model).__name__}; expected a Keras model")
+    return model

@@ -1,0 +1,112 @@
+"""Policies without Q-values: functions of an observation, and objects with `predict`."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from keras_pendulum.environments.actions import torque_actions
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.errors import ConfigError
+from keras_pendulum.evaluate.answers import (
+    ActionError,
+    call_agent,
+    indices_of,
+    is_instance,
+    name_of,
+    torques_of,
+)
+from keras_pendulum.evaluate.policy import Observations, Policy
+from keras_pendulum.evaluate.q_policies import q_function
+from keras_pendulum.storage.run_info import RunInfo
+
+
+class FunctionPolicy(Policy):
+    """A function from one observation [3] to a torque in N·m. It may have a state."""
+
+    one_by_one = True
+
+    def __init__(self, source: Any, info: RunInfo | None = None) -> None:
+        super().__init__(name_of(source), info)
+        self._source = source
+
+    def act(self, observations: Observations) -> NDArray[np.float64]:
+        """Returns the torques [B, 1]. Raises ActionError for an answer that is not a torque."""
+        if not self.one_by_one:
+            return self._torques(observations)[:, np.newaxis]
+        torques = np.empty((len(observations), 1))
+        for row, observation in enumerate(observations):
+            try:
+                torques[row] = self._torques(observation)
+            except ActionError as error:
+                error.row = row
+                raise
+        return torques
+
+    def _torques(self, observations: Observations) -> NDArray[np.float64]:
+        """Returns the torques in N·m: [B] for observations [B, 3], [] for [3]."""
+        return torques_of(call_agent(self._source, observations), observations.shape[:-1])
+
+
+class PredictPolicy(FunctionPolicy):
+    """An object with `predict(observation, deterministic=True)`, as Stable-Baselines3 has.
+
+    Without an action space, the object may take one observation at a time only, and its actions are
+    indices if `torques` are given, else torques.
+
+    Args:
+        source: the object.
+        torques: N·m, what the indices stand for; None takes `linspace(-2, 2, A)`.
+
+    Raises ConfigError when its spaces are not those of the pendulum.
+    """
+
+    def __init__(self, source: Any, torques: ArrayLike | None) -> None:
+        gamma = getattr(source, "gamma", None)
+        super().__init__(source, RunInfo(settings={} if gamma is None else {"discount": gamma}))
+        shape = getattr(getattr(source, "observation_space", None), "shape", (3,))
+        if shape is None or tuple(shape) != (3,):
+            raise ConfigError(f"{self.name} takes observations of the shape {shape}; expected (3,)")
+        space: Any = getattr(source, "action_space", None)
+        bounds: Any = [getattr(space, "low", None), getattr(space, "high", None)]
+        if hasattr(space, "n"):
+            self.actions = torque_actions(torques, int(space.n))
+        elif space is None and torques is not None:
+            self.actions = torque_actions(torques)
+        elif torques is not None:
+            raise ConfigError(f"torques are given, but {self.name} chooses no index: {space}")
+        elif space is not None and not np.array_equal(np.ravel(bounds), [-MAX_TORQUE, MAX_TORQUE]):
+            raise ConfigError(
+                f"{self.name} has the actions {space}; expected one torque from -2 to 2 N·m: give "
+                "a function that returns the torque"
+            )
+        self.one_by_one = space is None
+        self._first = int(getattr(space, "start", 0))
+        network: Any = getattr(source, "q_net", None)  # of Stable-Baselines3's DQN
+        self.has_q_values = self.actions is not None and is_instance(network, "torch.nn", "Module")
+        if self.has_q_values:
+            self.q_values = q_function(network, torques).q_values  # type: ignore[method-assign]
+
+    def _torques(self, observations: Observations) -> NDArray[np.float64]:
+        answer = call_agent(self._source.predict, observations, deterministic=True)
+        if not isinstance(answer, tuple) or not answer:
+            raise ActionError(
+                f"predict returned a {name_of(type(answer))}; expected a pair (action, state)"
+            )
+        batch = observations.shape[:-1]
+        if self.actions is None:
+            return torques_of(answer[0], batch)
+        indices = indices_of(answer[0], batch, self.actions.count, self._first)
+        return np.asarray(self.actions.values[indices, 0])
+
+
+def has_predict(source: Any) -> bool:
+    """Returns whether `predict` takes `deterministic`, unlike that of other libraries."""
+    try:
+        parameters = inspect.signature(source.predict).parameters.values()
+    except (AttributeError, TypeError, ValueError):
+        return False
+    return any(each.name == "deterministic" or each.kind == each.VAR_KEYWORD for each in parameters)

@@ -1,0 +1,107 @@
+"""The files of exact results: those of the package, and those in the user's cache folder."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.config.fields import Integer, Number
+from keras_pendulum.environments.pendulum import (
+    STEPS_PER_EPISODE,
+    Pendulum,
+    validate_gravity,
+)
+from keras_pendulum.errors import UserError
+from keras_pendulum.storage.atomic_write import write_atomically
+
+
+class Problem(NamedTuple):
+    """The problem of the pendulum that a result solves."""
+
+    gravity: float  # m/s²
+    steps: int  # of an episode
+    discount: float  # γ; 1 for the highest undiscounted return
+
+    @classmethod
+    def valid(
+        cls, gravity: float, steps: int = STEPS_PER_EPISODE, discount: float = 1.0
+    ) -> Problem:
+        """Returns the problem. Raises ConfigError for a number out of range."""
+        return cls(
+            validate_gravity(gravity),
+            Integer(1, STEPS_PER_EPISODE).validate("steps", steps),
+            Number(0, 1).validate("discount", discount) + 0.0,  # -0.0 becomes 0.0
+        )
+
+    @property
+    def file_name(self) -> str:
+        """The name of its file, such as `gravity_10_steps_40_discount_0.985.npz`."""
+        name = f"gravity_{str(self.gravity).removesuffix('.0')}"
+        name += "" if self.steps == STEPS_PER_EPISODE else f"_steps_{self.steps}"
+        name += "" if self.discount == 1 else f"_discount_{str(self.discount).removesuffix('.0')}"
+        return f"{name}.npz"
+
+
+def read_returns(path: Path | None, problem: Problem) -> dict[int, float]:
+    """Returns the returns by seed; none where `read` returns nothing, or they cannot be right."""
+    arrays = read(path, problem, "seeds", "returns")
+    if [array.dtype for array in arrays] != [np.int64, np.float64]:
+        return {}
+    seeds, returns = arrays
+    valid = seeds.ndim == 1 and seeds.shape == returns.shape
+    if not valid or not are_between(problem.steps * Pendulum.reward_range[0], returns):
+        return {}
+    return dict(zip(seeds.tolist(), returns.tolist(), strict=True))
+
+
+def are_between(lowest: float, values: NDArray[Any]) -> bool:
+    """Returns whether all values are from `lowest` to 0, as no reward is positive."""
+    return bool(((values >= lowest) & (values <= 0)).all())  # false for NaN
+
+
+def read(path: Path | None, problem: Problem, *names: str) -> list[NDArray[Any]]:
+    """Returns the arrays of these names in a file.
+
+    The result is empty when the file is missing, damaged, or of another problem.
+    """
+    if path is None:
+        return []
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            # A file of 200 steps or of discount 1 may leave them out.
+            found = {"steps": STEPS_PER_EPISODE, "discount": 1.0, **file}
+            own = all(np.array_equal(found[key], value) for key, value in problem._asdict().items())
+            return [found[name] for name in names] if own else []
+    except Exception:  # one flipped bit of an archive can raise any of seven exception types
+        return []
+
+
+def write(path: Path, problem: Problem, **arrays: NDArray[Any]) -> None:
+    """Writes a file that `read` reads. Raises UserError when it cannot be written."""
+    buffer = io.BytesIO()
+    members: dict[str, Any] = {**problem._asdict(), **arrays}
+    np.savez_compressed(buffer, **members)
+    write_atomically(path, buffer.getvalue())
+
+
+def cache_file(name: str) -> Path | None:
+    """Returns the path of a file in the user's cache folder; None for a user without a home."""
+    try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()
+    except RuntimeError:
+        return None
+    return Path(base, "keras_pendulum", name)
+
+
+def write_to_cache(path: Path | None, problem: Problem, **arrays: NDArray[Any]) -> None:
+    """Writes a file of the cache, if it can be written: it only saves time."""
+    if path is not None:
+        with contextlib.suppress(OSError, UserError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write(path, problem, **arrays)

@@ -1,0 +1,58 @@
+"""The solution of each task: best and random returns."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.optimum.solutions import SOLUTIONS, solution
+
+
+def test_every_task_has_a_solution() -> None:
+    assert SOLUTIONS.keys() == TASKS.keys()
+
+
+def test_random_return_is_the_published_one() -> None:
+    # -909 at g = 1 over seeds 0 to 999; the mean over 100 of them differs by less than 10 %.
+    assert solution(Pendulum()).random_return() == pytest.approx(-909, rel=0.1)
+
+
+def test_random_return_equals_gymnasiums_for_the_same_torques() -> None:
+    env, random = gymnasium.make("Pendulum-v1", g=10.0), np.random.RandomState(0)
+    torques = np.linspace(-2, 2, 41)
+    total = 0.0
+    for seed in range(100):
+        env.reset(seed=seed)
+        for _ in range(7):
+            total += float(env.step([random.choice(torques)])[1])
+    assert solution(Pendulum(10.0)).random_return(7) == pytest.approx(total / 100, rel=1e-9)
+
+
+def test_random_episodes_have_the_requested_number_of_steps() -> None:
+    one_step = solution(Pendulum()).random_return(1)
+    assert one_step == pytest.approx(-(np.pi**2 / 3 + 0.1 / 3 + 0.001 * 4 / 3), rel=0.2)
+    assert solution(CartPole()).random_return(5) == 5  # no pole falls over within 5 steps
+
+
+@pytest.mark.parametrize(
+    ("preset", "steps", "optimum"),
+    [
+        ("reference", 200, -40.69),
+        ("swingup", 30, -117.93),
+        ("swingup", 200, -135.5),
+        ("cartpole", 500, 500),
+        ("cartpole", 60, 60),
+        ("cartpole", 900, 900),
+        ("reference", 201, np.nan),
+    ],
+)
+def test_mean_best_return_is_that_of_episodes_of_the_given_length(
+    preset: str, steps: int, optimum: float
+) -> None:
+    value = solution(kp.preset(preset).task).mean_best_return(steps)
+    assert value == pytest.approx(optimum, abs=0.3 if steps == 200 else 0.01, nan_ok=True)
