@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import Field, dataclass, field
 from typing import Any, ClassVar
 
@@ -63,11 +63,7 @@ class Integers:
 
     def validate(self, name: str, value: Any) -> Any:
         """Returns `value` as a tuple of int. Raises ConfigError."""
-        if (
-            isinstance(value, str | bytes)
-            or not isinstance(value, Sequence)
-            or not 1 <= len(value) <= 16
-        ):
+        if not isinstance(value, list | tuple) or not 1 <= len(value) <= 16:
             raise ConfigError(f"{name} is {value!r}; expected 1 to 16 whole numbers")
         one = Integer(self.low, self.high)
         return tuple(one.validate(name, number) for number in value)
@@ -77,9 +73,12 @@ class Integers:
 class Text:
     """A text; one of `choices`, where there are any."""
 
-    choices: tuple[str, ...] = ()
+    choices: Collection[str] = ()
 
-    expected: ClassVar[str] = "a name"
+    @property
+    def expected(self) -> str:
+        """The values that are accepted, in words."""
+        return f"one of {', '.join(self.choices)}" if self.choices else "a name"
 
     def parse(self, text: str) -> Any:
         """Returns the text."""
@@ -87,10 +86,8 @@ class Text:
 
     def validate(self, name: str, value: Any) -> Any:
         """Returns `value`. Raises ConfigError."""
-        if not isinstance(value, str):
-            raise ConfigError(f"{name} is {value!r}; expected a name")
-        if self.choices and value not in self.choices:
-            raise ConfigError(f"{name} is {value!r}; expected one of {', '.join(self.choices)}")
+        if not isinstance(value, str) or (self.choices and value not in self.choices):
+            raise ConfigError(f"{name} is {value!r}; expected {self.expected}")
         return value
 
 
@@ -116,9 +113,53 @@ class Switch:
 Kind = Number | Integers | Text | Switch
 
 
-def setting(default: Any, help: str, kind: Kind) -> Any:
-    """Returns a dataclass field with its default, its help text and the values it accepts."""
-    return field(default=default, metadata={"help": help, "kind": kind})
+@dataclass(frozen=True)
+class Only:
+    """The values of another setting with which a setting has an effect."""
+
+    name: str  # of the other setting
+    values: tuple[str, ...]  # every value but 0 where there are none
+    unused: Any  # the value of a setting without an effect
+
+    def holds(self, settings: Mapping[str, Any]) -> bool:
+        """Returns whether the setting has an effect with these settings."""
+        value = settings[self.name]
+        return value in self.values if self.values else bool(value)
+
+    def check(self, name: str, value: Any, settings: Mapping[str, Any]) -> None:
+        """Raises ConfigError for a value of the setting `name` that is not used, or missing."""
+        other = settings[self.name]
+        if self.holds(settings):
+            if value is None and self.unused is None:
+                raise ConfigError(f"{name} is missing; {self.name} {other} needs it")
+        elif value != self.unused:
+            change = f"set {name} none" if self.unused is None else "leave it out"
+            raise ConfigError(
+                f"{name} {format_value(value)} has no effect with {self.name} "
+                f"{format_value(other)}: {change}, or set {self}"
+            )
+
+    def __str__(self) -> str:
+        return f"{self.name} {' or '.join(self.values) or 'above 0'}"
+
+
+def setting(default: Any, help: str, kind: Kind, only: Sequence[str] = ()) -> Any:
+    """Returns a dataclass field of the Config.
+
+    Args:
+        default: its value in `reference`.
+        help: what it means.
+        kind: the values that it accepts.
+        only: the name of another setting, and the values of that one with which this one has an
+            effect; the name alone stands for every value but 0. Without an effect, an optional
+            setting is None, and any other has its default.
+    """
+    condition = None
+    if only:
+        unused = None if isinstance(kind, Number) and kind.optional else default
+        condition = Only(only[0], tuple(only[1:]), unused)
+        help += f"; only with {condition}{', else none' if unused is None else ''}"
+    return field(default=default, metadata={"help": help, "kind": kind, "only": condition})
 
 
 def kind_of(spec: Field[Any]) -> Kind:

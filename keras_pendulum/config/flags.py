@@ -8,19 +8,17 @@ from typing import Any
 
 from keras_pendulum.cli import OneLineParser
 from keras_pendulum.completion import complete_with, names
-from keras_pendulum.config.config import Config
+from keras_pendulum.config.config import Config, Recording
 from keras_pendulum.config.fields import Switch, Text, format_value, kind_of
 from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.config.settings import RENAMED, parse_setting
-from keras_pendulum.errors import ConfigError
 
-# The settings that people change first. `--help` shows these, `--help-all` shows all.
+# The settings that people change first. `--help` shows these and those of Recording, `--help-all`
+# shows all.
 _FIRST = (
     *("gravity", "episodes", "seed", "hidden_units", "replay_capacity", "batch_size", "discount"),
     *("epsilon_decay", "updates_per_episode", "learning_rate"),
 )
-# These change nothing in what is learned, and `--help` shows them too.
-_DURING_THE_RUN = ("evaluate_every", "keep_best", "snapshots")
 
 
 def add_config_flags(parser: OneLineParser) -> None:
@@ -31,52 +29,43 @@ def add_config_flags(parser: OneLineParser) -> None:
     first = parser.add_argument_group(
         "settings that people change first (each preset has its own defaults)"
     )
-    during = parser.add_argument_group("evaluations and snapshots during the run")
+    during = parser.add_argument_group("checkpoints, evaluations and snapshots during the run")
     others = parser.add_argument_group("other settings")
-    groups = dict.fromkeys(_FIRST, first) | dict.fromkeys(_DURING_THE_RUN, during)
+    groups = dict.fromkeys(_FIRST, first)
+    groups |= {spec.name: during for spec in fields(Recording)}
     for spec in fields(Config):
         if spec.name != "preset":
             kind = kind_of(spec)
-            choices = kind.choices if isinstance(kind, Text) else None
+            options: dict[str, Any] = {"metavar": "N"}
+            if isinstance(kind, Text) and kind.choices:
+                options = {"choices": kind.choices}
+            elif isinstance(kind, Switch):  # without a value it is true
+                options = {"nargs": "?", "const": "true", "metavar": "{true,false}"}
             flag = groups.get(spec.name, others).add_argument(
                 _flag(spec.name),
                 dest=spec.name,
-                action=_Setting,
-                nargs="?" if isinstance(kind, Switch) else None,
-                const="true",  # of a switch without a value
-                choices=choices or None,
                 default=argparse.SUPPRESS,
-                metavar=None if choices else "{true,false}" if isinstance(kind, Switch) else "N",
                 help=f"{spec.metadata['help']} [{_defaults(spec.name)}]".replace("%", "%%"),
+                **options,
             )
             if isinstance(kind, Switch):
                 complete_with(flag, names(("true", "false")))
             if spec.name not in groups:
                 parser.hide(flag)
     for name in RENAMED:
-        parser.add_argument(_flag(name), dest=name, action=_Setting, help=argparse.SUPPRESS)
+        parser.add_argument(
+            _flag(name), dest=name, default=argparse.SUPPRESS, help=argparse.SUPPRESS
+        )
 
 
 def settings_from_args(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Returns the settings that the user typed, without the preset."""
-    names = {spec.name for spec in fields(Config)} - {"preset"}
-    return {name: value for name, value in vars(arguments).items() if name in names}
+    """Returns the settings that the user typed, without the preset.
 
-
-class _Setting(argparse.Action):
-    """An argparse action that parses a setting; for an old name, the error says the new one."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        try:
-            setattr(namespace, self.dest, parse_setting(self.dest, values))
-        except ConfigError as error:
-            parser.error(str(error))
+    Raises ConfigError for the old name of a setting, and for a text of another kind.
+    """
+    names = {*Config.__dataclass_fields__, *RENAMED} - {"preset"}
+    typed = vars(arguments).items()
+    return {name: parse_setting(name, text) for name, text in typed if name in names}
 
 
 def _flag(name: str) -> str:

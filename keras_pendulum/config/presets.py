@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.settings import require_known
 from keras_pendulum.errors import ConfigError, did_you_mean
 
-_REFERENCE = Config()
-# The final listing of the inverted-pendulum page (July 2023), with its defects.
-_ORIGINAL = replace(
+PRESETS: dict[str, Config] = {}
+DESCRIPTIONS: dict[str, str] = {}  # one line for each preset
+
+
+def _define(name: str, description: str, base: Config, **changes: Any) -> Config:
+    """Lists a preset that is `base` with some settings changed; returns it."""
+    DESCRIPTIONS[name] = description
+    PRESETS[name] = base.change(preset=name, **changes)
+    return PRESETS[name]
+
+
+_REFERENCE = _define("reference", "the original without defects (default)", Config())
+# The final listing of the inverted-pendulum page (July 2023).
+_ORIGINAL = _define(
+    "original",
+    "the final listing, with its defects",
     _REFERENCE,
-    preset="original",
     max_episode_steps=200,
     replay_capacity=8000,
     updates_per_episode=1,
@@ -21,21 +32,21 @@ _ORIGINAL = replace(
     target_update="none",
 )
 # The runnable block of the step-by-step listing on the same page.
-_WALKTHROUGH = replace(
+_define(
+    "walkthrough",
+    "the step-by-step listing, with defects",
     _ORIGINAL,
-    preset="walkthrough",
     episodes=400,
     hidden_units=(128, 64, 32),
     replay_capacity=4000,
     batch_size=64,
     stored_index="truncated",
 )
-
-# The standard, harder task: at g = 10 the torque cannot lift the pendulum in one swing.
-_SWINGUP = replace(
+_define(
+    "swingup",
+    "the same agent on the standard task",
     _REFERENCE,
-    preset="swingup",
-    gravity=10.0,
+    gravity=10.0,  # the torque cannot lift the pendulum in one swing
     episodes=3400,
     # Most regret arises in the first 20 steps; 30 are too short (docs/last_regret.md).
     max_episode_steps=40,
@@ -51,12 +62,11 @@ _SWINGUP = replace(
     learning_rate_min=5e-5,
     average_updates=1500,
 )
-
-# The agent of the two PyTorch notebooks, with their numbers.
-_CARTPOLE_ORIGINAL = Config(
-    preset="cartpole-original",
+_CARTPOLE_ORIGINAL = _define(
+    "cartpole-original",
+    "the agent of two PyTorch notebooks",
+    _REFERENCE,
     environment="CartPole-v1",
-    gravity=None,
     episodes=600,
     max_episode_steps=500,
     hidden_units=(128, 128),
@@ -78,11 +88,10 @@ _CARTPOLE_ORIGINAL = Config(
     learning_rate_schedule="constant",
     tau=0.005,
 )
-
-# The same network on the same task, tuned to balance the pole for all 500 steps.
-_CARTPOLE = replace(
+_define(
+    "cartpole",
+    "this agent, tuned for all 500 steps",
     _CARTPOLE_ORIGINAL,
-    preset="cartpole",
     reward_scale=0.01,
     # Random actions bring the cart near the ends of its track, also at the end of the run.
     epsilon_min=0.2,
@@ -95,25 +104,9 @@ _CARTPOLE = replace(
     average_updates=1500,
 )
 
-PRESETS: dict[str, Config] = {
-    config.preset: config
-    for config in (
-        _REFERENCE,
-        _ORIGINAL,
-        _WALKTHROUGH,
-        _SWINGUP,
-        _CARTPOLE_ORIGINAL,
-        _CARTPOLE,
-    )
-}
-
-
-# The preset to name to someone who asks for an environment alone.
-_PRESET_OF = {"Pendulum-v1": "reference", "CartPole-v1": "cartpole"}
-
 
 def preset(name: str = "reference", **changes: Any) -> Config:
-    """Returns the preset `name` with some settings changed.
+    """Returns the preset `name` with some settings changed, as `Config.change` does.
 
     Raises ConfigError for an unknown preset or setting, for a value out of range, and for another
     environment without its gravity.
@@ -126,13 +119,13 @@ def preset(name: str = "reference", **changes: Any) -> Config:
             f"unknown preset {name!r}; expected one of {', '.join(PRESETS)}"
             f"{did_you_mean(str(name), PRESETS)}"
         )
+    own, environment = PRESETS[name].environment, changes.get("environment")
+    suitable = [each.preset for each in PRESETS.values() if each.environment == environment]
+    if suitable and environment != own and "gravity" not in changes:
+        raise ConfigError(
+            f"the preset {name} belongs to {own}: for {environment}, take one of the presets "
+            f"{', '.join(suitable)} (--preset NAME)"
+        )
     for setting in changes:
         require_known(setting)
-    own = PRESETS[name].environment
-    for other, suitable in _PRESET_OF.items():
-        if changes.get("environment") == other != own and "gravity" not in changes:
-            raise ConfigError(
-                f"the preset {name} belongs to {own}: for {other}, take the preset {suitable} "
-                f"(--preset {suitable})"
-            )
-    return replace(PRESETS[name], **changes)
+    return PRESETS[name].change(**changes)

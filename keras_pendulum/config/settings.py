@@ -1,10 +1,11 @@
-"""Single settings by their name: validation, parsing, unknown and old names."""
+"""Settings by their names: those that a user types, and those that a file records."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-from keras_pendulum.config.config import Config
+from keras_pendulum.config.config import Config, used
 from keras_pendulum.config.fields import kind_of
 from keras_pendulum.errors import ConfigError, did_you_mean
 
@@ -39,6 +40,22 @@ def parse_setting(name: str, text: str) -> Any:
         return kind.parse(text)
     except ValueError as error:
         raise ConfigError(f"{name} is {text!r}; expected {kind.expected}") from error
+
+
+def read_settings(recorded: Mapping[str, Any]) -> Config:
+    """Returns the settings that a checkpoint, a network or `config.json` records as JSON.
+
+    A setting that is missing has its default. One that has no effect with the others gets its
+    default or None: older versions record any value of it.
+
+    Raises ConfigError for other JSON, for an unknown or renamed setting, and for settings that no
+    run can have.
+    """
+    if not isinstance(recorded, Mapping):
+        raise ConfigError(f"the recorded settings are {recorded!r}; expected a JSON object")
+    for name in recorded:
+        require_known(name)
+    return Config(**used({**vars(Config()), **recorded}))
 
 
 def require_known(name: str) -> None:

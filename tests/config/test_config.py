@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.config.config import Config
-from keras_pendulum.config.fields import Integer, Number, kind_of
-from keras_pendulum.config.settings import RENAMED, parse_setting, validate_setting
+from keras_pendulum.config.config import Config, Recording
+from keras_pendulum.config.fields import Integer, Number, Only, Text, kind_of
+from keras_pendulum.config.settings import read_settings, validate_setting
 
 INF, NAN = float("inf"), float("nan")
 # The lowest and the highest value of each number.
@@ -68,41 +69,15 @@ def test_limits_are_accepted_and_the_next_number_is_refused(name: str) -> None:
             validate_setting(name, value)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        *[("gravity", value) for value in (-1.0, NAN, INF, 101.0)],
-        *[("episodes", value) for value in (0, -5, 10**9)],
-        *[("seed", value) for value in (-1, 2**32)],
-        *[("hidden_units", value) for value in ((), (0,), (8193,), (10**6,), (8,) * 17)],
-        *[("torque_count", value) for value in (0, 1, 10**6)],
-        *[("replay_capacity", value) for value in (0, -1, 10**12)],
-        *[("batch_size", value) for value in (0, 10**9)],
-        *[("discount", value) for value in (-0.1, 1.1, NAN)],
-        *[("epsilon_start", value) for value in (-0.1, 1.1, NAN)],
-        *[("learning_rate", value) for value in (0.0, -1e-3, NAN, INF, 1e9)],
-        *[("updates_per_episode", value) for value in (0, -1)],
-        *[("tau", value) for value in (-0.1, 1.5, NAN)],
-        *[("target_update", value) for value in ("", "sometimes")],
-        *[("learning_rate_schedule", value) for value in ("linear",)],
-        *[("train_frequency", value) for value in ("reset", "steps")],
-        *[("environment", value) for value in ("Acrobot-v1", "Nonsense-v0")],
-        *[("save_every", value) for value in (0, -1)],
-        *[("episodes", value) for value in (1.5, True, "12", None, (5,))],
-        *[("gravity", value) for value in (True, "1", None, (0.5,))],
-        *[("hidden_units", value) for value in (8, "8", None, (8.5,), (8, "8"))],
-        *[("target_update", value) for value in (5, None, ("soft",))],
-        *[("double_q", value) for value in ("true", 1, None)],
-    ],
-)
-def test_value_out_of_range_is_refused_with_its_setting(name: str, value: Any) -> None:
-    with pytest.raises(kp.ConfigError, match=f"^{name} "):
-        kp.preset("reference", **{name: value})
-
-
-def test_number_beyond_all_floats_is_refused() -> None:
-    with pytest.raises(kp.ConfigError, match=r"^learning_rate is 1000"):
-        kp.preset("reference", learning_rate=10**400)
+@pytest.mark.parametrize("spec", dataclasses.fields(Config), ids=lambda spec: spec.name)
+def test_value_that_no_setting_accepts_is_refused_with_its_setting(spec: Any) -> None:
+    values: list[Any] = [object(), -5, NAN, (0,)]
+    kind = kind_of(spec)
+    if not isinstance(kind, Text) or kind.choices:
+        values += ["", "nonsense"]
+    for value in values:
+        with pytest.raises(kp.ConfigError, match=f"^{spec.name} "):
+            Config(**{spec.name: value})
 
 
 def test_numpy_numbers_and_lists_are_stored_as_python_values() -> None:
@@ -118,40 +93,6 @@ def test_numpy_numbers_and_lists_are_stored_as_python_values() -> None:
 def test_config_cannot_be_changed() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         Config().episodes = 3  # type: ignore[misc]
-
-
-@pytest.mark.parametrize("name", RENAMED)
-def test_renamed_setting_is_refused_with_its_new_name(name: str) -> None:
-    message = f"^the setting {name} is now "
-    with pytest.raises(kp.ConfigError, match=message):
-        parse_setting(name, "1")
-    with pytest.raises(kp.ConfigError, match=message):
-        validate_setting(name, 1)
-    new_name = RENAMED[name].split()[0]
-    assert new_name in Config.__dataclass_fields__
-
-
-def test_unknown_setting_is_refused() -> None:
-    for name in ("colour", "", "__doc__"):
-        with pytest.raises(kp.ConfigError, match=f"^unknown setting {name}$"):
-            parse_setting(name, "1")
-        with pytest.raises(kp.ConfigError, match=f"^unknown setting {name}$"):
-            validate_setting(name, 1)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "expected"),
-    [
-        ("discount", "none", "a number"),
-        ("episodes", "none", "a whole number"),
-        ("episodes", "1.5", "a whole number"),
-        ("hidden_units", "8;4", "whole numbers with commas, such as 64,64"),
-        ("double_q", "1", "true or false"),
-    ],
-)
-def test_parse_setting_refuses_text_of_another_kind(name: str, text: str, expected: str) -> None:
-    with pytest.raises(kp.ConfigError, match=f"^{name} is '{text}'; expected {expected}$"):
-        parse_setting(name, text)
 
 
 def test_checkpoint_too_large_to_load_is_refused() -> None:
@@ -233,7 +174,7 @@ def test_batch_larger_than_the_buffer_at_the_first_update_is_refused(warmup: int
         ("reference", {}),
         # One update after each step, from the first full batch: any batch that fits is possible.
         ("cartpole-original", {}),
-        ("original", {"train_frequency": "step", "warmup_episodes": 0, "max_episode_steps": 5}),
+        ("original", {"train_frequency": "step", "max_episode_steps": 5, "episodes": 1}),
         # A fallen pole ends an episode, so the number of stored transitions is not known.
         ("cartpole", {"warmup_episodes": 0, "max_episode_steps": 5}),
     ],
@@ -244,7 +185,8 @@ def test_batch_larger_than_the_buffer_is_refused(preset: str, changes: dict[str,
 
 
 @pytest.mark.parametrize(
-    ("episodes", "warmup", "updates"), [(500, 41, 459), (42, 41, 1), (41, 41, 0), (3, 41, 0)]
+    ("episodes", "warmup", "updates"),
+    [(500, 41, 459), (42, 41, 1), (41, 41, 0), (3, 41, 0), (7, 0, 7)],
 )
 def test_total_updates_counts_the_episodes_after_the_warmup(
     episodes: int, warmup: int, updates: int
@@ -259,33 +201,16 @@ def test_total_updates_counts_the_episodes_after_the_warmup(
         assert config.total_updates == updates * per_episode
 
 
-def test_total_updates_without_warmup_counts_every_episode() -> None:
-    config = kp.preset("reference", episodes=7, warmup_episodes=0, updates_per_episode=3)
-    assert config.total_updates == 21
-
-
 @pytest.mark.parametrize(
     ("preset", "changes", "message"),
     [
-        ("cartpole", {"gravity": 1.0}, "gravity 1.0 belongs to Pendulum-v1; CartPole-v1 has no"),
-        ("cartpole", {"torque_count": 5}, "torque_count 5 belongs to Pendulum-v1"),
-        ("cartpole", {"stored_index": "truncated"}, "stored_index truncated belongs to Pendulum"),
-        (
-            "cartpole",
-            {"train_frequency": "step"},
-            "learning_rate_schedule cosine needs train_frequency",
-        ),
-        (
-            "cartpole",
-            {"environment": "Pendulum-v1", "gravity": None},
-            "gravity is missing; Pendulum-v1 needs it",
-        ),
+        ("cartpole", {"environment": "Pendulum-v1", "gravity": None}, "gravity is missing; "),
         (
             "reference",
             {"train_frequency": "step"},
             "learning_rate_schedule cosine needs train_frequency",
         ),
-        ("reference", {"gravity": None}, "gravity is missing; Pendulum-v1 needs it"),
+        ("reference", {"gravity": None}, "gravity is missing; environment Pendulum-v1 needs it"),
         (
             "reference",
             {"learning_rate_min": 0.1},
@@ -307,7 +232,6 @@ def test_total_updates_without_warmup_counts_every_episode() -> None:
             {"hidden_units": (8192, 3000), "snapshots": 20},
             "snapshots and hidden_units make a file of 1.0 GiB; the limit is 1 GiB",
         ),
-        ("cartpole", {"keep_best": True}, "keep_best needs evaluate_every: .*--evaluate-every 50"),
         (
             "walkthrough",
             {"torque_count": 40},
@@ -320,3 +244,86 @@ def test_settings_that_exclude_each_other_are_refused(
 ) -> None:
     with pytest.raises(kp.ConfigError, match=f"^{message}"):
         kp.preset(preset, **changes)
+
+
+# A setting and a value of it, the setting that decides whether it has an effect, a value of that
+# one with an effect and one without, and other settings that the latter needs.
+CONDITIONS: list[tuple[str, Any, str, Any, Any, dict[str, Any]]] = [
+    ("gravity", 1.0, "environment", "Pendulum-v1", "CartPole-v1", {}),
+    ("torque_count", 5, "environment", "Pendulum-v1", "CartPole-v1", {"gravity": None}),
+    ("stored_index", "truncated", "environment", "Pendulum-v1", "CartPole-v1", {"gravity": None}),
+    ("epsilon_decay", 0.5, "epsilon_schedule", "episodes", "steps", {}),
+    ("epsilon_decay_steps", 5.0, "epsilon_schedule", "steps", "episodes", {}),
+    *(
+        (name, 5, "train_frequency", "episode", "step", {"learning_rate_schedule": "constant"})
+        for name in ("warmup_episodes", "updates_per_episode")
+    ),
+    ("weight_decay", 0.5, "optimizer", "adamw", "adam", {}),
+    ("learning_rate_min", 1e-4, "learning_rate_schedule", "cosine", "constant", {}),
+    ("double_q", True, "target_update", "soft", "none", {}),
+    ("tau", 0.5, "target_update", "soft", "hard", {}),
+    ("tau", 0.5, "target_update", "soft", "none", {}),
+    ("target_period", 5, "target_update", "hard", "soft", {}),
+    ("target_period", 5, "target_update", "hard", "none", {}),
+    ("keep_best", True, "evaluate_every", 50, 0, {}),
+]
+
+
+def test_every_setting_with_a_condition_is_in_this_file() -> None:
+    conditions = {spec.name: spec.metadata["only"] for spec in dataclasses.fields(Config)}
+    assert {name for name, only in conditions.items() if only} == {row[0] for row in CONDITIONS}
+
+
+@pytest.mark.parametrize(("name", "value", "other", "with_effect", "without", "more"), CONDITIONS)
+def test_setting_without_an_effect_is_refused_reset_or_read(
+    name: str, value: Any, other: str, with_effect: Any, without: Any, more: dict[str, Any]
+) -> None:
+    used = Config(**{other: with_effect, name: value})
+    assert getattr(used, name) == value
+    text = str(value).lower()
+    remedy = "set gravity none" if name == "gravity" else "leave it out"
+    shown = {"keep_best": "above 0", "double_q": "soft or hard"}.get(name, with_effect)
+    message = (
+        f"{name} {text} has no effect with {other} {without}: {remedy}, or set {other} {shown}"
+    )
+    unused = Config(**{"gravity": None if other == "environment" else 1.0, other: without, **more})
+    for config, changes in (
+        (unused, {name: value}),
+        (used, {name: value, other: without, **more}),
+    ):
+        for change in (dataclasses.replace, Config.change):
+            with pytest.raises(kp.ConfigError, match=f"^{re.escape(message)}$"):
+                change(config, **changes)
+    assert used.change(**{other: without, **more}) == unused
+    assert read_settings({**vars(unused), name: value}) == unused
+
+
+def test_setting_names_the_condition_after_its_decider_and_in_its_help() -> None:
+    names = [spec.name for spec in dataclasses.fields(Config)]
+    for spec in dataclasses.fields(Config):
+        only: Only | None = spec.metadata["only"]
+        if only:
+            # So the decider is validated first, and its error is the one that is raised.
+            assert names.index(only.name) < names.index(spec.name)
+            assert f"; only with {only}" in spec.metadata["help"]
+
+
+def test_wrong_value_of_the_decider_is_refused_before_the_settings_without_an_effect() -> None:
+    for change in (dataclasses.replace, Config.change):
+        with pytest.raises(kp.ConfigError, match=r"^target_update is 'sometimes'; expected one of"):
+            change(kp.preset("cartpole-original"), target_update="sometimes")
+
+
+def test_change_refuses_an_unknown_setting() -> None:
+    with pytest.raises(TypeError, match="colour"):
+        Config().change(colour=1)
+
+
+def test_learning_has_every_setting_that_is_not_of_the_recording() -> None:
+    assert [spec.name for spec in dataclasses.fields(Recording)] == [
+        *("save_every", "evaluate_every", "keep_best", "snapshots")
+    ]
+    config = Config(seed=3, save_every=7, evaluate_every=5, keep_best=True, snapshots=2)
+    assert Config(**config.learning()) == Config(seed=3)
+    assert vars(config).keys() - config.learning().keys() == set(Recording.__dataclass_fields__)
+    assert next(iter(vars(config))) == "preset"
