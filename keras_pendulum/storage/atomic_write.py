@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import sys
 import time
@@ -64,20 +63,20 @@ def retry_while_open(action: Callable[[], _Result]) -> _Result:
 
     Raises OSError as the action does; on Windows, a PermissionError says what to do.
     """
-    for attempt in itertools.count():
-        try:
+    if sys.platform != "win32":
+        return action()
+    for _ in range(_RETRIES):
+        with contextlib.suppress(PermissionError):
             return action()
-        except PermissionError as error:
-            if sys.platform != "win32":
-                raise
-            if attempt == _RETRIES:
-                raise PermissionError(
-                    error.errno,
-                    "another program has the file open, or it is read-only; close it there, and "
-                    "run the command again",
-                ) from error
         time.sleep(_SECONDS_BETWEEN)
-    raise AssertionError  # the loop has no end
+    try:
+        return action()
+    except PermissionError as error:
+        raise PermissionError(
+            error.errno,
+            "another program has the file open, or it is read-only; close it there, and run the "
+            "command again",
+        ) from error
 
 
 def _flush_folder(folder: Path) -> None:

@@ -10,7 +10,6 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import BinaryIO
 
 from keras_pendulum.errors import WeightsError
 from keras_pendulum.storage.atomic_write import write_atomically
@@ -29,37 +28,28 @@ def write_with_checksum(
     write_atomically(path, content, _LABEL + digest.encode(), check=check)
 
 
-def verify(file: BinaryIO) -> None:
-    """Raises WeightsError when a file does not match its checksum.
+def verify(content: bytes) -> None:
+    """Raises WeightsError when the content of a file does not match its checksum.
 
     Accepts a file that ends with its HDF5 content: Keras writes no checksum.
     """
-    head = file.read(64)
-    size = file.seek(0, os.SEEK_END)
-    end = _end_of_content(head)
-    if end is None or size <= end:
+    end = _end_of_content(content)
+    if end is None or len(content) <= end:
         return
-    content_size = max(0, size - _CHECKSUM_SIZE)
-    file.seek(content_size)
-    found = file.read()
-    file.seek(0)
-    sha256 = hashlib.sha256()
-    while content_size > 0 and (part := file.read(min(content_size, 2**20))):
-        sha256.update(part)
-        content_size -= len(part)
-    if found != _LABEL + sha256.hexdigest().encode():
+    checked = memoryview(content)[:-_CHECKSUM_SIZE]
+    if content[len(checked) :] != _LABEL + hashlib.sha256(checked).hexdigest().encode():
         raise WeightsError(
             "the file is damaged, or another program changed it (its SHA-256 differs from the "
             "recorded one)"
         )
 
 
-def _end_of_content(head: bytes) -> int | None:
-    """Returns the size of the HDF5 content from the first 64 bytes of a file, None if unknown.
+def _end_of_content(content: bytes) -> int | None:
+    """Returns where a file says that its HDF5 content ends, None if unknown.
 
     HDF5 File Format Specification, "Superblock": the offset depends on the version.
     """
-    offset = {0: 40, 1: 44, 2: 28, 3: 28}.get(head[8]) if len(head) == 64 else None
-    if offset is None or not head.startswith(b"\x89HDF"):
+    if len(content) < 64 or not content.startswith(b"\x89HDF"):
         return None
-    return int.from_bytes(head[offset : offset + 8], "little")
+    offset = {0: 40, 1: 44, 2: 28, 3: 28}.get(content[8])
+    return None if offset is None else int.from_bytes(content[offset : offset + 8], "little")

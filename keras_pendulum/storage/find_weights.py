@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from keras_pendulum.errors import WeightsError, did_you_mean
-from keras_pendulum.storage.shipped_weights import shipped_folders, shipped_names
+from keras_pendulum.storage.shipped_weights import shipped_folder, shipped_names
 
 
 def find_weights(name: str | os.PathLike[str]) -> Path:
@@ -21,10 +21,9 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
             return path
     except OSError as error:  # a name that no file can have
         raise WeightsError(f"{name}: {error.strerror}; expected a weights file (.h5)") from error
-    for folder in shipped_folders():
-        for candidate in (folder / name, folder / f"{name}.h5"):
-            if path.name == name and candidate.is_file():
-                return candidate
+    shipped = name.removesuffix(".h5")
+    if shipped in shipped_names():
+        return shipped_folder() / f"{shipped}.h5"
     if path.is_dir():
         files = sorted(file.name for file in path.glob("*.h5"))
         example = f", such as {path / files[0]}" if files else ""

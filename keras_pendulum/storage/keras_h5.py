@@ -7,10 +7,8 @@ numbers, and when each layer has as many inputs as the previous one has outputs.
 
 from __future__ import annotations
 
-import re
 from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -140,8 +138,8 @@ def _keras3_layers(file: H5File, path: str) -> list[StoredLayer]:
         if last != "vars" or not parents or {*parents[:1], *parents[-1:]} & _NOT_LAYERS:
             continue
         prefix = f"{group}/"
-        keys = sorted((key for key in file.shapes if key.startswith(prefix)), key=_number)
-        arrays = {key: file.shapes[key] for key in keys}
+        keys = [key for key in file.shapes if key.startswith(prefix)]
+        arrays = {key: file.shapes[key] for key in sorted(keys, key=lambda key: _split(key)[1])}
         *containers, key = parents
         container: str | None = "/".join(containers)
         name = attributes.get("name", "/".join(parents))
@@ -150,13 +148,12 @@ def _keras3_layers(file: H5File, path: str) -> list[StoredLayer]:
         if not arrays:
             _require_no_effect(path, name, kind)
             continue
-        if containers[-1:] == ["layers"] and _without_number(kind) != "dense":
+        if containers[-1:] == ["layers"] and _split(kind)[0] != "dense":
             raise UnknownLayersError(f"{path}: layer {name} is a {kind}; expected Dense layers")
-        ordered = _without_number(key) == "dense" and _is_ordered(file, containers)
-        group = "/".join(parents)
-        layers.append(
-            StoredLayer(name, group, arrays, container if ordered else None, _number(key))
-        )
+        stem, number = _split(key)
+        if stem != "dense" or not _is_ordered(file, containers):
+            container = None
+        layers.append(StoredLayer(name, "/".join(parents), arrays, container, number))
     return layers
 
 
@@ -170,13 +167,13 @@ def _is_ordered(file: H5File, containers: list[str]) -> bool:
         return "/".join((*containers, "vars")) not in file  # a list has no variables of its own
     owner = containers[:-1]
     recorded = file.attributes.get("/".join((*owner, "vars")), {}).get("name", "")
-    kinds = {_without_number(str(recorded)), *map(_without_number, owner[-1:])}
+    kinds = [_split(name)[0] for name in (str(recorded), *owner[-1:])]
     return "/".join((*containers, "input_layer")) in file or "sequential" in kinds
 
 
 def _require_no_effect(path: str, name: str, kind: str) -> None:
     """Raises WeightsError for a layer without weights that may change the network."""
-    if _without_number(kind) not in _WITHOUT_WEIGHTS:
+    if _split(kind)[0] not in _WITHOUT_WEIGHTS:
         raise WeightsError(
             f"{path}: layer {name} has no weights, and the file does not record what it does; "
             "expected Dense layers"
@@ -191,25 +188,8 @@ def _texts(file: H5File, path: str, group: str, attribute: str) -> list[str]:
     return value
 
 
-def _number(name: str) -> int:
-    """Returns the number at the end of a name, 0 without one."""
-    found = re.search(r"\d+$", name)
-    return int(found[0]) if found else 0
-
-
-def _without_number(name: str) -> str:
-    return re.sub(r"_?\d+$", "", name)
-
-
-def write_layers(file: h5py.File, arrays: list[NDArray[np.float32]]) -> None:
-    """Writes kernel, bias, kernel, bias, … in the layout of Keras 2's `save_weights`."""
-    names = ["dense" if i == 0 else f"dense_{i}" for i in range(len(arrays) // 2)]
-    file.attrs["backend"] = np.bytes_("tensorflow")
-    file.attrs["keras_version"] = np.bytes_("2.15.0")  # the version whose layout this is
-    file.attrs["layer_names"] = np.array(names, "S")
-    for name, kernel, bias in zip(names, arrays[::2], arrays[1::2], strict=True):
-        layer = file.create_group(name)
-        layer.attrs["weight_names"] = np.array([f"{name}/kernel:0", f"{name}/bias:0"], "S")
-        for weight, array in {"kernel:0": kernel, "bias:0": bias}.items():
-            layer.create_dataset(f"{name}/{weight}", data=array, track_times=False)
-    file.create_group("top_level_model_weights").attrs["weight_names"] = np.array([], "S1")
+def _split(name: str) -> tuple[str, int]:
+    """Returns a name without the number at its end, and the number: `dense` and 2 of `dense_2`."""
+    stem = name.rstrip("0123456789")
+    number = name[len(stem) :]
+    return (stem.removesuffix("_"), int(number)) if number else (name, 0)

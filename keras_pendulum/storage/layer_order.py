@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from keras_pendulum.errors import WeightsError
@@ -57,12 +57,9 @@ def _fits(order: Sequence[StoredLayer], input_size: int) -> bool:
 
 
 def _respects_containers(order: Sequence[StoredLayer]) -> bool:
-    containers = {layer.container for layer in order} - {None}
-    return all(
-        _increases(layer.number for layer in order if layer.container == container)
-        for container in containers
-    )
-
-
-def _increases(numbers: Iterable[int]) -> bool:
-    return all(a < b for a, b in itertools.pairwise(numbers))
+    """Returns whether the layers of each container are in the order of their numbers."""
+    numbers: dict[str, list[int]] = {}
+    for layer in order:
+        if layer.container is not None:
+            numbers.setdefault(layer.container, []).append(layer.number)
+    return all(each == sorted(each) for each in numbers.values())

@@ -78,10 +78,9 @@ def _check(layer: dict[str, Any], path: str) -> None:
     """Raises WeightsError for a layer that a chain of Dense layers cannot have."""
     kind, config = layer["class_name"], layer["config"]
     name = config["name"]
-    if kind not in ("InputLayer", "Flatten", "Dense", "Activation", "Dropout") or layer.get(
-        "registered_name"
-    ):
-        _refuse(path, name, f"is a {layer.get('registered_name') or kind}")
+    registered_name = layer.get("registered_name")
+    if registered_name or kind not in _KINDS:
+        _refuse(path, name, f"is a {registered_name or kind}")
     shape = config.get("batch_shape", config.get("batch_input_shape"))
     if shape is not None and len(shape) != 2:
         _refuse(path, name, f"takes inputs of the shape {shape}")
@@ -116,9 +115,8 @@ def _in_call_order(config: dict[str, Any], path: str) -> list[dict[str, Any]]:
         _refuse(path, chain[1], "is a second input")
     while chain[-1] in following and len(chain) <= len(layers):  # no more than once around a circle
         chain.append(following[chain[-1]])
-    for name in layers:
-        if name not in chain:
-            _refuse(path, name, "is not on the way from the input to the output")
+    if apart := layers.keys() - chain:
+        _refuse(path, min(apart), "is not on the way from the input to the output")
     if _names(config["output_layers"]) != chain[-1:]:
         _refuse(path, chain[-1], "is not the only output")
     return [layers[name] for name in chain]

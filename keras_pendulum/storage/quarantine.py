@@ -1,12 +1,12 @@
-"""Reads HDF5 files through another process (`h5_process`), so that a hostile file harms only that.
+"""Reads HDF5 files through another process (`hdf5_reader`), so that a hostile file harms only that.
 
-The process starts with the first file and serves all later ones. When it crashes, takes too long or
-exceeds its memory, the file is refused, and the next file gets a new process.
+Each file gets a process of its own, which ends when it has read the file. Its output is a temporary
+file without a name, not a pipe: `subprocess.run` then does all the waiting and killing, and an
+array takes memory only when it is used.
 """
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import json
 import math
@@ -15,7 +15,7 @@ import re
 import signal
 import subprocess
 import sys
-import threading
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -24,39 +24,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.errors import UserError, WeightsError
+from keras_pendulum.limits import LARGEST_DESCRIPTION, LARGEST_FILE
 
-LARGEST_ANSWER = 2**20  # bytes of JSON: names, attributes, types and shapes
-_SECONDS_TO_START = 120.0  # with a cold disk or a virus scanner
+SECONDS = 8.0  # of processor time for a small file
+# The clock ends a process that waits, and any process where the system does not limit its processor
+# time. It is generous, because other programs may slow the process down.
+_SECONDS_BY_THE_CLOCK = 120.0  # beyond the processor time
+_READER = ("-P", "-m", "keras_pendulum.storage.hdf5_reader")
+# Which error a wrong value causes depends on the code that uses it.
+_DAMAGE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _NUMBERS = re.compile(r"[<>|][fiub][1248]")  # NumPy's names of the types of numbers
 
 
-def seconds_for(file_size: int) -> float:
-    """Returns the longest time in seconds for reading a file of `file_size` bytes."""
-    return 8 + file_size / 2**25
-
-
 class H5File:
-    """The content of an open HDF5 file: attributes and arrays, by the path of their object in it.
+    """The content of an HDF5 file: attributes and arrays, by the path of their object in it.
 
     Attributes are numbers, strings and lists of them; None stands for anything else.
+
+    Args:
+        path: the file, for messages.
+        output: of `hdf5_reader`.
+        size: of the file in bytes.
+
+    Raises WeightsError when the reader refused the file, and ValueError for a wrong output.
     """
 
-    def __init__(self, path: str, process: _Process, size: int) -> None:
+    def __init__(self, path: str, output: IO[bytes], size: int) -> None:
         self._path = path
-        self._process = process
-        self._seconds = seconds_for(size)
-        content = process.ask(path, {"open": str(Path(path).absolute())}, self._seconds)
-        self.attributes: dict[str, dict[str, Any]] = content["attributes"]
+        self._output = output
+        output.seek(0)
+        description = json.loads(output.readline(LARGEST_DESCRIPTION + 1))
+        if "error" in description:
+            raise WeightsError(f"{path}: {description['error']}")
+        self.attributes: dict[str, dict[str, Any]] = description["attributes"]
         self.shapes: dict[str, tuple[int, ...]] = {}  # of all arrays
-        self._types: dict[str, np.dtype[Any]] = {}
-        for name, (dtype, shape) in content["arrays"].items():
+        self._places: dict[str, tuple[int, np.dtype[Any]]] = {}
+        start = place = output.tell()
+        for name, (dtype, shape) in description["arrays"].items():
             if not _NUMBERS.fullmatch(dtype) or min(shape, default=0) < 0:
                 raise ValueError(f"{name} has the type {dtype} and the shape {shape}")
-            self._types[name] = np.dtype(dtype)
             self.shapes[name] = tuple(map(int, shape))
-        declared = sum(math.prod(self.shapes[name]) * self._types[name].itemsize for name in self)
-        if declared > size:
-            raise ValueError(f"its arrays declare {declared} bytes; the file has {size}")
+            self._places[name] = place, np.dtype(dtype)
+            place += math.prod(self.shapes[name]) * np.dtype(dtype).itemsize
+        found = output.seek(0, os.SEEK_END) - start
+        if not place - start == found <= size:
+            raise ValueError(
+                f"its arrays declare {place - start} bytes and have {found}; the file has {size}"
+            )
 
     def __contains__(self, name: str) -> bool:
         """Returns whether the file has such a group or array."""
@@ -74,8 +88,10 @@ class H5File:
         """
         if name not in self.shapes:
             raise WeightsError(f"{self._path}: has no array {name}")
-        array = np.empty(self.shapes[name], self._types[name])
-        self._process.ask(self._path, {"read": name}, self._seconds, array)
+        place, dtype = self._places[name]
+        self._output.seek(place)
+        content = bytearray(self._output.read(math.prod(self.shapes[name]) * dtype.itemsize))
+        array = np.frombuffer(content, dtype).reshape(self.shapes[name])
         with np.errstate(over="ignore"):  # a number too large for float32 becomes infinite
             if finite and not np.isfinite(array.astype(np.float32, copy=False)).all():
                 raise WeightsError(f"{self._path}: {name} holds NaN or infinite numbers")
@@ -84,25 +100,26 @@ class H5File:
 
 @contextlib.contextmanager
 def open_h5(path: str | os.PathLike[str]) -> Iterator[H5File]:
-    """Opens an `.h5` file, or the HDF5 file inside a `.keras` file, for reading.
+    """Reads an `.h5` file, or the HDF5 file inside a `.keras` file, for the `with` block.
 
     The attribute `model_config` of a `.keras` file is its configuration.
 
     Raises WeightsError when the file is missing, a folder, empty, of another kind, damaged, or
-    harmful; also for damage that is found inside the `with` block.
+    harmful, or when no process can read it; also for damage that is found inside the `with` block.
     """
     name = os.fsdecode(path)
-    with _LOCK:
-        process = _running_process()
+    with report_damage(name), contextlib.ExitStack() as stack:
+        if not Path(name).is_file():
+            found = "not a file" if Path(name).exists() else "no such file"
+            raise WeightsError(f"{name}: {found}; expected a weights file (.h5)")
         try:
-            size = Path(name).stat().st_size
-        except OSError:
-            size = 0  # the process says what is wrong
-        try:
-            with report_damage(name):
-                yield H5File(name, process, size)
-        finally:
-            process.close_file()
+            with open(name, "rb") as file:
+                size = _size(file, name)
+                output = stack.enter_context(tempfile.TemporaryFile())
+                _run_reader(file, output, SECONDS + size / 2**25)
+        except OSError as error:
+            raise WeightsError(f"{name}: cannot be read ({error})") from error
+        yield H5File(name, output, size)
 
 
 @contextlib.contextmanager
@@ -112,140 +129,60 @@ def report_damage(path: str | os.PathLike[str]) -> Iterator[None]:
         yield
     except UserError:
         raise
-    # Which error a wrong value causes depends on the code that uses it.
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except _DAMAGE as error:
         raise WeightsError(
             f"{os.fsdecode(path)}: cannot be read, the file is damaged ({error})"
         ) from error
 
 
-class _Process:
-    """A process that reads files. The constructor raises UserError when it does not start."""
+def _size(file: IO[bytes], path: str) -> int:
+    """Returns the size of a file. Raises WeightsError when it cannot hold weights, or is locked."""
+    size = os.fstat(file.fileno()).st_size
+    if not size:
+        raise WeightsError(f"{path}: the file is empty; expected a weights file (.h5)")
+    if size > LARGEST_FILE:
+        raise WeightsError(f"{path}: larger than 1 GiB, the limit of a weights file")
+    if sys.platform != "win32":
+        import fcntl
 
-    def __init__(self) -> None:
-        # The process must find the modules where this one has found them.
-        search_path = os.pathsep.join(entry for entry in sys.path if entry)
-        self._owner = os.getpid()
-        try:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "keras_pendulum.storage.h5_process"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,
-                start_new_session=True,  # Ctrl-C in the terminal is for this process alone
-                env={**os.environ, "PYTHONPATH": search_path, "OPENBLAS_NUM_THREADS": "1"},
-            )
-        except OSError as error:
-            raise UserError(f"cannot start a process to read the file: {error.strerror}") from error
-        assert self._process.stdin and self._process.stdout
-        self._requests: IO[bytes] = self._process.stdin
-        self._answers: IO[bytes] = self._process.stdout
-        try:
-            self._receive(_SECONDS_TO_START, None)
-        except (EOFError, ValueError) as error:
-            raise UserError(f"cannot start a process to read the file: {error}") from error
-
-    def ask(
-        self, path: str, request: dict[str, Any], seconds: float, array: NDArray[Any] | None = None
-    ) -> dict[str, Any]:
-        """Returns the answer to a request.
-
-        Args:
-            path: the file, for messages.
-            request: see `h5_process`.
-            seconds: the longest time to wait.
-            array: is filled with the bytes that follow the answer.
-
-        Raises WeightsError when the process refuses the file, or ends.
-        """
-        try:
-            with contextlib.suppress(OSError):  # _receive reports the end of the process
-                self._requests.write(json.dumps(request).encode() + b"\n")
-                self._requests.flush()
-            answer = self._receive(seconds, array)
-        except (EOFError, ValueError) as error:
-            raise WeightsError(f"{path}: cannot be read, the file is damaged ({error})") from error
-        if "error" in answer:
-            raise WeightsError(f"{path}: {answer['error']}")
-        return answer
-
-    def close_file(self) -> bool:
-        """Closes the open file: Windows neither replaces nor removes an open one.
-
-        Returns whether the process is alive. A fork does not use the process of its parent.
-        """
-        if self._owner != os.getpid() or self._process.poll() is not None:
-            return False
-        try:
-            self.ask("", {"close": None}, seconds_for(0))
-        except WeightsError:
-            return False
-        return True
-
-    def stop(self) -> None:
-        """Ends the process."""
-        if self._owner == os.getpid():
-            self._process.kill()
-            self._process.wait()
-            for pipe in (self._requests, self._answers):
-                with contextlib.suppress(OSError):
-                    pipe.close()
-
-    def _receive(self, seconds: float, array: NDArray[Any] | None) -> dict[str, Any]:
-        """Returns an answer. Raises EOFError or ValueError when there is none, or a wrong one."""
-        clock = threading.Timer(seconds, self._process.kill)
-        clock.start()
-        try:
-            size = int.from_bytes(_read_exactly(self._answers, bytearray(8)), "little")
-            if size > LARGEST_ANSWER:
-                raise ValueError(f"an answer of {size} bytes")
-            answer: dict[str, Any] = json.loads(_read_exactly(self._answers, bytearray(size)))
-            if array is not None and "error" not in answer and array.nbytes:
-                _read_exactly(self._answers, array.reshape(-1).view(np.uint8).data)
-        except EOFError as error:
-            self.stop()
-            timed_out = not clock.is_alive()
-            raise EOFError(_reason(self._process.returncode, seconds, timed_out)) from error
-        except BaseException:  # the rest of the answer is still to come
-            self.stop()
-            raise
-        finally:
-            clock.cancel()
-        return answer
+        try:  # HDF5 locks a file that it writes
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise WeightsError(
+                f"{path}: another program has opened the file for writing; close it there, or try "
+                "again later"
+            ) from error
+        except OSError:  # a file system without locks
+            pass
+    return size
 
 
-def _read_exactly(stream: IO[bytes], buffer: Any) -> Any:
-    """Fills the buffer from the stream and returns it. Raises EOFError when the stream ends."""
-    view = memoryview(buffer)
-    while view:
-        count = stream.readinto(view)  # type: ignore[attr-defined]
-        if not count:
-            raise EOFError
-        view = view[count:]
-    return buffer
+def _run_reader(file: IO[bytes], output: IO[bytes], seconds: float) -> None:
+    """Runs `hdf5_reader`, with limited processor time in seconds, until it ends.
 
-
-def _reason(returncode: int, seconds: float, timed_out: bool) -> str:
-    """Returns why the process ended."""
-    if timed_out:
-        return f"reading it takes more than {seconds:.0f} s"
-    if returncode < 0:
-        return f"the process that read it ended with {signal.Signals(-returncode).name}"
-    return f"the process that read it ended with status {returncode}"
-
-
-_LOCK = threading.RLock()
-_PROCESS: list[_Process] = []  # the running one
-
-
-def _running_process() -> _Process:
-    """Returns the process of this one, a new one when there is none."""
-    if not _PROCESS or not _PROCESS[0].close_file():
-        _PROCESS[:] = [_Process()]
-    return _PROCESS[0]
-
-
-@atexit.register
-def _stop() -> None:
-    for process in _PROCESS:
-        process.stop()
+    Raises OSError when the process does not start, and ValueError when it does not end well.
+    """
+    # The process must find the modules where this one has found them.
+    search_path = os.pathsep.join([*filter(None, sys.path), str(Path(__file__).parents[2])])
+    try:
+        status = subprocess.run(
+            [sys.executable, *_READER, str(seconds)],
+            stdin=file,
+            stdout=output,
+            stderr=subprocess.DEVNULL,
+            timeout=_SECONDS_BY_THE_CLOCK + seconds,
+            check=False,
+            # Ctrl-C in the terminal is for this process alone. Windows needs the second option.
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+            env={**os.environ, "PYTHONPATH": search_path, "OPENBLAS_NUM_THREADS": "1"},
+        ).returncode
+    except subprocess.TimeoutExpired as error:
+        raise ValueError(f"reading it takes more than {error.timeout:.0f} s") from error
+    if status == 1:  # Python's own error, such as a missing module
+        raise OSError(f"{sys.executable} {' '.join(_READER)} does not start")
+    end = signal.Signals(-status).name if status < 0 else f"status {status}"
+    if end == "SIGPROF":  # see `hdf5_reader`
+        raise ValueError(f"reading it takes more than {seconds:.0f} s of processor time")
+    if status:
+        raise ValueError(f"the process that read it ended with {end}")

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.errors import WeightsError
+from keras_pendulum.errors import WeightsError, require_finite
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.quarantine import open_h5
-from keras_pendulum.storage.weights import encode_weights, require_finite
+from keras_pendulum.storage.save_weights import encode_weights
 
 _LARGEST = np.finfo(np.float16).max
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -11,7 +12,11 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.storage.checksum import verify, write_with_checksum
+from keras_pendulum.storage.hdf5_reader import copy_content
 from keras_pendulum.train.checkpoint import load_checkpoint
+
+CONFIG = kp.preset("reference", episodes=2, hidden_units=(16, 8), replay_capacity=1000)
+CONFIG = replace(CONFIG, warmup_episodes=1, batch_size=8)
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +25,6 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     folder = tmp_path_factory.mktemp("run")
     kp.train_dqn(CONFIG, folder)
     return (folder / "pendulum_weight.h5").read_bytes()
-
-
-CONFIG = kp.preset("reference", episodes=43, hidden_units=(16, 8), replay_capacity=1000)
 
 
 def refused(load: Callable[[Path], object], path: Path, content: bytes | bytearray) -> bool:
@@ -40,55 +42,49 @@ def resume(path: Path) -> object:
     return load_checkpoint(path, CONFIG)
 
 
-def test_500_flipped_bits_are_all_refused(checkpoint: bytes, tmp_path: Path) -> None:
+def damaged(content: bytes | bytearray) -> bool:
+    """Returns whether the reader of the files refuses the content, without its process."""
+    try:
+        copy_content(io.BytesIO(content), len(content), io.BytesIO())
+    except (OSError, kp.WeightsError):  # HDF5 itself refuses a truncated file
+        return True
+    return False
+
+
+def test_1000_flipped_bits_are_all_refused(checkpoint: bytes, tmp_path: Path) -> None:
     random = Random(0)
-    for _ in range(500):
+    for i in range(1000):
         flipped = bytearray(checkpoint)
         flipped[random.randrange(len(flipped))] ^= 1 << random.randrange(8)
-        for load in (kp.load_weights, resume):
-            assert refused(load, tmp_path / "flipped.h5", flipped)
+        assert damaged(flipped)
+        if i < 2:
+            for load in (kp.load_weights, resume):
+                assert refused(load, tmp_path / "flipped.h5", flipped)
 
 
 @pytest.mark.parametrize("size", [1, 8, 512, 4096])
-def test_zeroed_blocks_are_refused(size: int, checkpoint: bytes, tmp_path: Path) -> None:
+def test_zeroed_blocks_are_refused(size: int, checkpoint: bytes) -> None:
     random = Random(size)
     for _ in range(50):
         start = random.randrange(len(checkpoint) - size)
-        if not any(checkpoint[start : start + size]):
-            continue  # the block was zero before
         zeroed = checkpoint[:start] + bytes(size) + checkpoint[start + size :]
-        assert refused(kp.load_weights, tmp_path / "zeroed.h5", zeroed)
+        assert damaged(zeroed) or zeroed == checkpoint  # the block was zero before
 
 
 def test_truncated_files_are_refused(checkpoint: bytes, tmp_path: Path) -> None:
     end = checkpoint.rindex(b"\nkeras_pendulum sha256")  # of the HDF5 content
-    lengths = {
-        len(checkpoint) - 1,
-        end + 1,
-        0,
-        1,
-        7,
-        8,
-        9,
-        100,
-        511,
-        512,
-        2048,
-        end // 2,
-        end - 4096,
-        end - 8,
-        end - 1,
-    }
-    for length in sorted(lengths | set(range(0, end, 4999))):
+    near_the_ends = (1, 7, 8, 9, 100, 511, 512, 2048, end - 4096, end - 8, end - 1, end + 1)
+    for length in (*near_the_ends, len(checkpoint) - 1, *range(0, end, 4999)):
+        assert damaged(checkpoint[:length]), length
+    for length in (1, end // 2, end - 1):
         assert refused(kp.load_weights, tmp_path / "short.h5", checkpoint[:length]), length
 
 
-def test_incomplete_checksum_or_bytes_behind_it_are_refused(
-    checkpoint: bytes, tmp_path: Path
-) -> None:
+def test_incomplete_checksum_or_bytes_behind_it_are_refused(checkpoint: bytes) -> None:
     end = checkpoint.rindex(b"\nkeras_pendulum sha256")
+    assert not damaged(checkpoint)
     for content in (checkpoint[:-1], checkpoint[: end + 1], checkpoint + b"\n"):
-        assert refused(kp.load_weights, tmp_path / "tail.h5", content)
+        assert damaged(content)
 
 
 def test_file_without_checksum_loads(checkpoint: bytes, tmp_path: Path) -> None:
@@ -102,21 +98,20 @@ def hdf5_file(content_size: int, recorded_end: int) -> bytes:
     return head + Random(0).randbytes(content_size - len(head))
 
 
-@pytest.mark.parametrize("size", [64, 1000, 2**20, 2**20 + 1, 3 * 2**20 + 5])
+@pytest.mark.parametrize("size", [64, 1000, 2**20])
 def test_checksum_of_any_size_is_accepted_and_of_another_content_refused(
     size: int, tmp_path: Path
 ) -> None:
     path = tmp_path / "a.h5"
     write_with_checksum(path, hdf5_file(size, size))
-    with open(path, "rb") as file:
-        verify(file)
+    verify(path.read_bytes())
     changed = bytearray(path.read_bytes())
     changed[size - 1] ^= 1
     with pytest.raises(kp.WeightsError, match=r"^the file is damaged"):
-        verify(io.BytesIO(changed))
+        verify(bytes(changed))
 
 
 def test_file_that_is_shorter_than_a_checksum_is_refused() -> None:
     with pytest.raises(kp.WeightsError, match=r"^the file is damaged"):
-        verify(io.BytesIO(hdf5_file(70, 69)))
-    verify(io.BytesIO(hdf5_file(70, 70)))
+        verify(hdf5_file(70, 69))
+    verify(hdf5_file(70, 70))

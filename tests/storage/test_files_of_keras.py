@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import keras
 import numpy as np
 import pytest
 from conftest import Command
-from keras_networks import CHAINS, NETWORKS, SUBCLASSED, WEIGHTS, WHOLE, Network, saved_files
 
 import keras_pendulum as kp
-from keras_pendulum.dqn.policy import greedy_policy
+from benchmarks.files.keras_files import check_files, observations
+from benchmarks.files.keras_networks import NETWORKS, Order
+from keras_pendulum.page import __main__ as page
 
-CASES = [
-    pytest.param(name, version, id=f"{name}, Keras {version}")
-    for name, network in NETWORKS.items()
-    for version in network.versions
-]
-TOLERANCE = 1e-5
+# Each kind of layer, of model and of order; `benchmarks.files.keras_files` has all networks.
+DRAWN = (
+    *("two hidden layers", "tanh, relu, linear", "dense_10 before dense_2", "slashes in names"),
+    *("names in other alphabets", "Dropout before Activation", "trained by Adam"),
+    *("functional, created in another order", "attributes in another order"),
+    *("equal widths, names before and behind `layers`", "list of equal widths, called backwards"),
+    *("two Sequentials inside, called in another order", "this package's network of equal widths"),
+    *("LeakyReLU", "BatchNormalization", "Normalization", "Rescaling", "Lambda", "Conv1D", "Add"),
+    *("two inputs", "a layer used twice", "Flatten", "ReLU", "GaussianNoise"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -29,61 +33,20 @@ def keras_versions() -> dict[int, Any]:
     return {2: tf_keras, 3: keras}
 
 
-def observations(size: int = 3) -> np.ndarray[Any, Any]:
-    return np.random.default_rng(1).normal(size=(50, size)).astype(np.float32)
-
-
-def check(path: Path, network: Network, version: int, model: Any, **arguments: str) -> None:
-    """Raises AssertionError unless `load_weights` follows the network's rule for the file."""
-    rule = network.rule(path.name, version)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", UserWarning)
-            loaded = kp.load_weights(path, **arguments)
-    except kp.WeightsError as error:
-        message = str(error)
-        assert rule in ("refused", "either"), message
-        assert str(path) in message
-        assert message.isprintable()  # one line
-        if path.name in WHOLE and network.blamed:
-            words = message.replace(str(path), "")
-            assert any(layer in words for layer in network.blamed), message
-        return
-    assert rule in ("loads", "either"), f"{path.name} loads as {loaded.hidden_units}"
-    inputs = observations(network.inputs)
-    expected = np.asarray(model(inputs), np.float32)
-    for found in (loaded(inputs), greedy_policy(loaded).q_values(inputs)):
-        np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE, err_msg=path.name)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "version"), CASES)
-def test_whole_model_loads_as_the_same_network_or_is_refused_by_a_layer(
-    name: str, version: int, keras_versions: dict[int, Any], tmp_path: Path
-) -> None:
-    network = NETWORKS[name]
-    model = network.model(keras_versions[version])
-    # A subclassed model records no activation.
-    arguments = {"activation": network.activation} if name in SUBCLASSED else {}
-    for path in saved_files(model, version, WHOLE, tmp_path):
-        check(path, network, version, model, **arguments)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "version"), CASES)
-def test_weights_alone_load_as_the_same_network_or_are_refused(
-    name: str, version: int, keras_versions: dict[int, Any], tmp_path: Path
-) -> None:
-    network = NETWORKS[name]
-    model = network.model(keras_versions[version])
-    for path in saved_files(model, version, WEIGHTS, tmp_path):
-        if network.rule(path.name, version) != "untested":
-            check(path, network, version, model, activation=network.activation)
-
-
-def test_matrix_has_at_least_forty_networks_that_must_load() -> None:
-    assert len(CHAINS) >= 40
+def test_25_networks_of_all_rules_are_drawn() -> None:
+    assert len(DRAWN) == 25
+    assert {NETWORKS[name].order for name in DRAWN} == set(get_args(Order))
     assert len(NETWORKS) >= 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "version"), [(name, version) for name in DRAWN for version in NETWORKS[name].versions]
+)
+def test_files_load_as_the_same_network_or_are_refused_by_a_layer(
+    name: str, version: int, keras_versions: dict[int, Any], tmp_path: Path
+) -> None:
+    assert check_files(name, version, keras_versions[version], tmp_path)
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -125,7 +88,7 @@ def test_weights_alone_load_with_tanh_and_one_warning(
 
 
 def test_evaluate_takes_the_activation_or_warns_in_one_line(
-    command: Command, tmp_path: Path
+    command: Command, in_process: Command, tmp_path: Path
 ) -> None:
     NETWORKS["relu"].model(keras).save_weights(tmp_path / "a.weights.h5")
     words = ("evaluate", "a.weights.h5", "--episodes", "1", "--json")
@@ -133,18 +96,19 @@ def test_evaluate_takes_the_activation_or_warns_in_one_line(
     assert assumed.returncode == 0
     (line,) = assumed.stderr.splitlines()
     assert all(word in line for word in ("a.weights.h5", "tanh", "--activation"))
-    named = command(*words, "--activation", "relu")
+    named = in_process(*words, "--activation", "relu")
     assert (named.returncode, named.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("name", ["elu", "Add"])
 def test_page_refuses_another_network_in_one_line(
-    name: str, command: Command, tmp_path: Path
+    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     NETWORKS[name].model(keras).save(tmp_path / "a.keras")
-    done = command("page", "a.keras")
-    (line,) = done.stderr.splitlines()
-    assert (done.returncode, done.stdout) == (2, "")
+    assert page.main([str(tmp_path / "a.keras")]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    (line,) = printed.err.splitlines()
     assert line.startswith("error: ")
     assert "a.keras" in line
     assert "odd" in line

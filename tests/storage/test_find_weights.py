@@ -15,8 +15,9 @@ def test_find_weights_returns_a_shipped_file_unless_the_current_folder_has_that_
     (tmp_path / "reference").mkdir()  # a folder of that name is ignored
     shipped = kp.find_weights("reference")
     assert shipped == kp.find_weights("reference.h5") == kp.find_weights(Path("reference"))
-    provenance = kp.load_weights(shipped).provenance
-    assert (provenance.preset, provenance.seed, provenance.gravity) == ("reference", 0, 1.0)
+    metadata = kp.load_weights(shipped).metadata
+    recorded = [metadata[name] for name in ("preset", "seed", "gravity")]
+    assert recorded == ["reference", 0, 1.0]
     (tmp_path / "reference.h5").touch()
     assert kp.find_weights("reference.h5") == Path("reference.h5")
     with pytest.raises(kp.WeightsError, match="folder/reference: no such file"):
@@ -37,7 +38,7 @@ def test_load_weights_takes_a_path_or_a_shipped_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert kp.load_weights("cartpole").provenance.preset == "cartpole"
+    assert kp.load_weights("cartpole").metadata["preset"] == "cartpole"
     kp.save_weights(kp.DQN((8,)), "cartpole")  # the user's own file comes first
     assert kp.load_weights("cartpole").hidden_units == (8,)
     for wrong in ("nonsense", "", "a\0b", "x" * 999):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,21 +10,40 @@ from random import Random
 import pytest
 from conftest import Command
 from fuzz_files import LAYOUTS, fuzz
-from hostile_files import HOSTILE, write, write_sound
+from hostile_files import BY_H5PY, HOSTILE, KERNEL, write, write_sound
 from load_files import Loader, Outcome
 
-import keras_pendulum as kp
+from keras_pendulum.storage import quarantine
 
-MOST_MEMORY = 60  # MB
+MOST_MEMORY = 60  # MB, and for the reader twice the size of the file
 LONGEST_MESSAGE = 1000  # characters beside the path
+PROCESSOR_TIME = 0.5  # s; the reader of a small file takes 0.02 s after its imports
+# The benchmark loads each file in each layout. A change by h5py is the same in all of them.
+CASES = [
+    (kind, layout)
+    for kind, layout in HOSTILE
+    if kind not in BY_H5PY or layout == [*KERNEL][[*BY_H5PY].index(kind) % 3]
+]
 
 
 @pytest.fixture(scope="module")
 def loader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loader]:
-    path = tmp_path_factory.mktemp("sound") / "sound.h5"
-    kp.save_weights(kp.DQN((16, 8), 5), path)
-    with Loader(path) as loader:
+    sound = write_sound(tmp_path_factory.mktemp("sound") / "sound.h5", "this package")
+    with Loader(sound, endless=300, processor_time=PROCESSOR_TIME) as loader:
         yield loader
+
+
+@pytest.fixture(scope="module")
+def expected(loader: Loader, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The digest of the network in a sound file of each layout."""
+    folder = tmp_path_factory.mktemp("sound")
+    outcomes = {each: loader.load(write_sound(folder / named(each), each)) for each in LAYOUTS}
+    assert {outcome.kind for outcome in outcomes.values()} == {"loaded"}
+    return {layout: outcome.text for layout, outcome in outcomes.items()}
+
+
+def named(layout: str) -> str:
+    return "a.keras" if layout == "keras" else "a.h5"
 
 
 def check_refusal(outcome: Outcome, path: Path) -> None:
@@ -37,33 +55,28 @@ def check_refusal(outcome: Outcome, path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "layout"), HOSTILE)
+@pytest.mark.parametrize(("kind", "layout"), CASES)
 def test_hostile_file_is_refused_in_one_line_or_loads_unchanged(
-    kind: str, layout: str, loader: Loader, tmp_path: Path
+    kind: str, layout: str, loader: Loader, expected: dict[str, str], tmp_path: Path
 ) -> None:
     folder = tmp_path / "folder"
     folder.mkdir()
-    sound = write_sound(tmp_path / ("b.keras" if layout == "keras" else "b.h5"), layout)
-    expected = loader.load(sound)
-    assert expected.kind == "loaded", expected
     path = write(kind, layout, folder)
-    for function in ("load_weights", "load_config"):
-        outcome = loader.load(path, function)
-        if (outcome.kind, outcome.text) != ("loaded", expected.text):
-            check_refusal(outcome, path)
-        assert outcome.memory < MOST_MEMORY
-        assert outcome.child_memory < MOST_MEMORY
+    outcome = loader.load(path)
+    if (outcome.kind, outcome.text) != ("loaded", expected[layout]):
+        check_refusal(outcome, path)
+    assert outcome.memory < MOST_MEMORY
+    assert outcome.child_memory < MOST_MEMORY + 2 * path.stat().st_size / 1e6
     assert [file.name for file in folder.iterdir()] == [path.name]
     assert not (tmp_path / "outside.txt").exists()
 
 
 @pytest.mark.parametrize("layout", ["Keras 3", "keras"])
 def test_file_that_is_cut_short_while_it_is_read_is_refused_or_loads_unchanged(
-    layout: str, loader: Loader, tmp_path: Path
+    layout: str, loader: Loader, expected: dict[str, str], tmp_path: Path
 ) -> None:
-    path = write_sound(tmp_path / ("a.keras" if layout == "keras" else "a.h5"), layout)
+    path = write_sound(tmp_path / named(layout), layout)
     content = path.read_bytes()
-    expected = loader.load(path)
     random = Random(0)
     stopped = threading.Event()
 
@@ -76,48 +89,54 @@ def test_file_that_is_cut_short_while_it_is_read_is_refused_or_loads_unchanged(
     thread = threading.Thread(target=cut_and_mend)
     thread.start()
     try:
-        for _ in range(50):
+        for _ in range(10):
             outcome = loader.load(path)
-            if (outcome.kind, outcome.text) != ("loaded", expected.text):
+            if (outcome.kind, outcome.text) != ("loaded", expected[layout]):
                 check_refusal(outcome, path)
     finally:
         stopped.set()
         thread.join()
 
 
-@pytest.mark.parametrize("layout", ["this package", "Keras 3", "keras"])
-def test_evaluate_refuses_a_circular_file_in_one_line(
-    layout: str, command: Command, tmp_path: Path
+@pytest.mark.slow
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_files_damaged_at_random_are_refused_or_load(
+    layout: str, loader: Loader, tmp_path: Path
 ) -> None:
-    path = write("a B-tree node that is its child", layout, tmp_path)
-    done = command("evaluate", path.name)
-    (line,) = done.stderr.splitlines()
-    assert (done.returncode, done.stdout) == (2, "")
-    assert line.startswith(f"error: {path.name}: ")
+    row, failures = fuzz(layout, 20, loader, tmp_path)
+    assert failures == [], row
+    assert row["refused"] > 0
+    assert row["memory, MB"] < MOST_MEMORY
+    assert row["memory of the child, MB"] < MOST_MEMORY
 
 
 @pytest.mark.parametrize(
-    "kind", ["a B-tree node that is its child", "a heap with a circular free list"]
+    ("kind", "layout", "words"),
+    [
+        ("a B-tree node that is its child", "keras", ("evaluate", "a.keras")),
+        ("a B-tree node that is its child", "Keras 3", ("evaluate", "a.h5")),
+        (
+            "a heap with a circular free list",
+            "this package",
+            ("train", "--resume", "--out", "run"),
+        ),
+    ],
 )
-def test_resume_refuses_a_hostile_checkpoint_in_one_line(
-    kind: str, command: Command, tmp_path: Path
+def test_command_refuses_an_endless_file_in_one_line(
+    kind: str,
+    layout: str,
+    words: tuple[str, ...],
+    in_process: Command,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
-    (tmp_path / "run").mkdir()
-    path = write(kind, "this package", tmp_path / "run")
-    path.rename(tmp_path / "run" / "pendulum_weight.h5")
-    done = command("train", "--resume", "--out", "run")
+    monkeypatch.setattr(quarantine, "SECONDS", PROCESSOR_TIME)
+    path = write(kind, layout, tmp_path)
+    if words[0] == "train":
+        (tmp_path / "run").mkdir()
+        path = path.rename(tmp_path / "run" / "pendulum_weight.h5")
+    done = in_process(*words)
     (line,) = done.stderr.splitlines()
     assert (done.returncode, done.stdout) == (2, "")
     assert line.startswith("error: ")
-    assert "pendulum_weight.h5" in line
-
-
-@pytest.mark.slow
-def test_500_fuzzed_files_are_refused_or_load_quickly(tmp_path: Path) -> None:
-    for row, failures in fuzz(500 // len(LAYOUTS), tmp_path):
-        assert failures == [], row
-        assert row["refused"] > 0
-        assert row["loaded, equal"] > 0
-        assert row["memory, MB"] < MOST_MEMORY
-        assert row["memory of the child, MB"] < MOST_MEMORY
-    shutil.rmtree(tmp_path)
+    assert path.name in line

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -18,16 +17,22 @@ import tensorflow as tf
 from conftest import DATA
 
 import keras_pendulum as kp
-from keras_pendulum.dqn.network import Provenance
 from keras_pendulum.storage.checksum import write_with_checksum
-from keras_pendulum.storage.weights import encode_weights
+from keras_pendulum.storage.keras_h5 import _split
+from keras_pendulum.storage.save_weights import encode_weights
 
 OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
 
 
 def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
-    provenance = Provenance("Pendulum-v1", 2.5, "reference", 7, '{"seed": 7}')
-    return kp.DQN(hidden, actions, seed=3, provenance=provenance)
+    metadata = {
+        "environment": "Pendulum-v1",
+        "gravity": 2.5,
+        "preset": "reference",
+        "seed": 7,
+        "config": '{"seed": 7}',
+    }
+    return kp.DQN(hidden, actions, seed=3, metadata=metadata)
 
 
 def save_unchecked(network: kp.DQN, path: Path) -> None:
@@ -73,38 +78,33 @@ def assert_same_values(found: Any, expected: Any, tolerance: float = 0) -> None:
     np.testing.assert_allclose(found(OBSERVATIONS), expected(OBSERVATIONS), rtol=0, atol=tolerance)
 
 
-def test_load_weights_returns_the_saved_network_with_its_provenance(tmp_path: Path) -> None:
+def test_load_weights_returns_the_saved_network_with_its_metadata(tmp_path: Path) -> None:
     saved = network()
     kp.save_weights(saved, tmp_path / "a.h5")
     loaded = kp.load_weights(tmp_path / "a.h5")
     for found, expected in zip(loaded.get_weights(), saved.get_weights(), strict=True):
         np.testing.assert_array_equal(found, expected)
-    assert loaded.provenance == saved.provenance
+    assert loaded.metadata == saved.metadata
     assert (loaded.hidden_units, loaded.action_count) == ((16, 8), 5)
     assert loaded.built
 
 
 def test_same_network_makes_the_same_file_at_any_time(tmp_path: Path) -> None:
     kp.save_weights(network(), tmp_path / "a.h5", evaluated_return=-1.5)
-    time.sleep(1.1)  # HDF5 can store times, in whole seconds
     kp.save_weights(network(), tmp_path / "b.h5", evaluated_return=-1.5)
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    with h5py.File(tmp_path / "a.h5") as file:  # HDF5 can store times, in whole seconds
+        assert h5py.h5g.get_objinfo(file.id, b"dense/dense/kernel:0").mtime == 0
 
 
 @pytest.mark.parametrize("make", [subclassed, sequential])
-def test_keras_3_loads_a_saved_file(make: Callable[..., Any], tmp_path: Path) -> None:
+def test_keras_2_and_3_load_a_saved_file(
+    make: Callable[..., Any], keras2: Any, tmp_path: Path
+) -> None:
     kp.save_weights(network(), tmp_path / "a.h5")
-    model = make(keras)
-    model.load_weights(tmp_path / "a.h5")
-    assert_same_values(model, network(), 1e-6)
-
-
-@pytest.mark.parametrize("make", [subclassed, sequential])
-def test_keras_2_loads_a_saved_file(make: Callable[..., Any], keras2: Any, tmp_path: Path) -> None:
-    kp.save_weights(network(), tmp_path / "a.h5")
-    model = make(keras2)
-    model.load_weights(str(tmp_path / "a.h5"))
-    assert_same_values(model, network(), 1e-6)
+    for model in (make(keras), make(keras2)):
+        model.load_weights(str(tmp_path / "a.h5"))
+        assert_same_values(model, network(), 1e-6)
 
 
 def test_file_records_the_versions_of_the_packages_and_the_number_of_threads(
@@ -120,41 +120,27 @@ def test_file_records_the_versions_of_the_packages_and_the_number_of_threads(
     assert found == {"python": python, "tensorflow": tf.__version__, **packages, **threads}
 
 
-@pytest.mark.parametrize("make_name", ["subclassed", "sequential"])
-def test_keras_2_and_3_load_a_checkpoint(make_name: str, keras2: Any, tmp_path: Path) -> None:
-    make = {"subclassed": subclassed, "sequential": sequential}[make_name]
-    config = kp.preset("reference", episodes=42, hidden_units=(16, 8), torque_count=5)
+def test_keras_2_and_3_load_a_checkpoint(keras2: Any, tmp_path: Path) -> None:
+    config = kp.preset("reference", episodes=1, hidden_units=(16, 8), torque_count=5)
     result = kp.train_dqn(config, tmp_path)
-    for module in (keras, keras2):
-        model = make(module)
+    for model in (make(module) for make in (subclassed, sequential) for module in (keras, keras2)):
         model.load_weights(str(tmp_path / "pendulum_weight.h5"))
         assert_same_values(model, result.network, 1e-6)
 
 
-@pytest.mark.parametrize("hidden", [(512, 256, 128), (128, 64, 32)])
-@pytest.mark.parametrize("actions", [41, 7])
-def test_load_weights_reads_keras_2_files_of_other_sizes(
-    hidden: tuple[int, ...], actions: int, keras2: Any, tmp_path: Path
-) -> None:
-    model = subclassed(keras2, hidden, actions)
+def test_load_weights_reads_a_keras_2_file_of_other_sizes(keras2: Any, tmp_path: Path) -> None:
+    model = subclassed(keras2, (128, 64, 32), 7)
     model.save_weights(str(tmp_path / "a.h5"))
     loaded = kp.load_weights(tmp_path / "a.h5", "tanh")
-    assert (loaded.hidden_units, loaded.action_count) == (hidden, actions)
+    assert (loaded.hidden_units, loaded.action_count) == ((128, 64, 32), 7)
     assert_same_values(loaded, model, 1e-6)
-
-
-def test_load_weights_reads_a_keras_2_sequential(keras2: Any, tmp_path: Path) -> None:
-    layers = [keras2.layers.Flatten(), *dense_layers(keras2, (16, 8), 5)]
-    model = keras2.Sequential([keras2.Input((3,)), *layers, keras2.layers.Activation("linear")])
-    model.save_weights(str(tmp_path / "a.h5"))
-    assert_same_values(kp.load_weights(tmp_path / "a.h5", "tanh"), model, 1e-6)
 
 
 @pytest.mark.parametrize("make", [subclassed, sequential])
 def test_load_weights_reads_keras_3_files(make: Callable[..., Any], tmp_path: Path) -> None:
     # Twelve layers, because alphabetically "dense_10" comes before "dense_2".
     model = make(keras, hidden=(6,) * 11)
-    model.compile("adam", "mse")
+    model.compile("adam", "mse", run_eagerly=True)  # starts fast
     model.train_on_batch(OBSERVATIONS, np.zeros((20, 5)))  # so that it has an optimizer to save
     model.save_weights(tmp_path / "a.weights.h5")
     assert_same_values(kp.load_weights(tmp_path / "a.weights.h5", "tanh"), model, 1e-6)
@@ -163,12 +149,6 @@ def test_load_weights_reads_keras_3_files(make: Callable[..., Any], tmp_path: Pa
 def test_load_weights_reads_a_keras_3_file_of_a_dqn(tmp_path: Path) -> None:
     network().save_weights(tmp_path / "a.weights.h5")
     assert_same_values(kp.load_weights(tmp_path / "a.weights.h5", "tanh"), network(), 0)
-
-
-def test_load_weights_orders_named_layers_by_their_sizes(tmp_path: Path) -> None:
-    model = named_layers(zebra=16, apple=8, mango=5)
-    model.save_weights(tmp_path / "a.weights.h5")
-    assert_same_values(kp.load_weights(tmp_path / "a.weights.h5", "tanh"), model, 1e-6)
 
 
 def test_layers_of_unclear_order_are_refused(tmp_path: Path) -> None:
@@ -197,11 +177,25 @@ def named_layers(**units: int) -> Any:
     return model
 
 
+@pytest.mark.parametrize(
+    ("name", "stem", "number"),
+    [
+        ("dense_12", "dense", 12),
+        ("dense12", "dense", 12),
+        ("dense_", "dense_", 0),
+        ("12", "", 12),
+        ("1" * 10**6 + "x", "1" * 10**6 + "x", 0),  # in linear time
+    ],
+)
+def test_number_at_the_end_of_a_name_is_split_off(name: str, stem: str, number: int) -> None:
+    assert _split(name) == (stem, number)
+
+
 def make_changed(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
     """Returns a function that writes a valid file and changes something in it."""
 
     def make(path: Path) -> None:
-        kp.save_weights(network(), path)
+        save_unchecked(network(), path)
         with h5py.File(path, "r+") as file:
             change(file)
 
@@ -221,7 +215,7 @@ def set_value(file: h5py.File, value: float) -> None:
 
 
 def truncate(path: Path) -> None:
-    kp.save_weights(network(), path)
+    save_unchecked(network(), path)
     path.write_bytes(path.read_bytes()[:-1])
 
 
@@ -229,24 +223,6 @@ def other_model(path: Path) -> None:
     model = keras.Sequential([keras.Input((8, 8, 1)), keras.layers.Conv2D(2, 3)])
     model.save_weights(path.with_suffix(".weights.h5"))
     path.with_suffix(".weights.h5").rename(path)
-
-
-def make_external(file: h5py.File) -> None:
-    del file["dense_1/dense_1/bias:0"]
-    storage = [("/etc/hostname", 0, 32)]
-    file.create_dataset("dense_1/dense_1/bias:0", (8,), np.float32, external=storage)
-
-
-def make_virtual(file: h5py.File) -> None:
-    layout = h5py.VirtualLayout((8,), np.float32)
-    layout[:] = h5py.VirtualSource("elsewhere.h5", "data", (8,))
-    del file["dense_1/dense_1/bias:0"]
-    file.create_virtual_dataset("dense_1/dense_1/bias:0", layout)
-
-
-def make_unwritten(file: h5py.File) -> None:
-    del file["dense_1/dense_1/bias:0"]
-    file.create_dataset("dense_1/dense_1/bias:0", (2**30,), np.float32)
 
 
 def make_too_wide(file: h5py.File) -> None:
@@ -260,7 +236,6 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     "folder": (lambda path: path.mkdir(), "a folder"),
     "empty": (lambda path: path.write_bytes(b""), "the file is empty"),
     "text": (lambda path: path.write_text("plain text"), "not an HDF5 file"),
-    "html": (lambda path: path.write_text("<!DOCTYPE html><html>404"), "not an HDF5 file"),
     "lfs": (lambda path: path.write_text("version https://git-lfs.example/v1"), "not an HDF5"),
     "truncated": (truncate, "damaged"),
     "no layers": (lambda path: h5py.File(path, "w").close(), "holds no network weights"),
@@ -292,10 +267,6 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
         make_changed(replace_array("dense_1/dense_1/kernel:0", np.full((16, 8), 1e300))),
         "NaN or infinite",
     ),
-    "text array": (
-        make_changed(replace_array("dense_1/dense_1/kernel:0", np.full((16, 8), b"x"))),
-        "not a plain array",
-    ),
     "integers": (
         make_changed(replace_array("dense_1/dense_1/kernel:0", np.zeros((16, 8), "i4"))),
         "expected floating-point",
@@ -304,9 +275,6 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
         make_changed(replace_array("dense_1/dense_1/kernel:0", KERNEL, compression="gzip")),
         "not a plain array",
     ),
-    "data in another file": (make_changed(make_external), "not a plain array"),
-    "virtual": (make_changed(make_virtual), "not a plain array"),
-    "declared but not stored": (make_changed(make_unwritten), "not a plain array"),
     "too wide": (make_changed(make_too_wide), "expected 1 to 8192"),
     "activation": (
         make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("activation", "elu")),
@@ -322,7 +290,7 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     ),
     "gravity": (
         make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__("gravity", np.nan)),
-        "the recorded gravity is nan",
+        "gravity is nan; expected a number from 0 to 100",
     ),
 }
 
@@ -348,14 +316,13 @@ def test_bad_file_is_refused_in_one_line_that_names_it(kind: str, tmp_path: Path
         (lambda: kp.DQN((8193,), 2), "has 8193 units; expected 1 to 8192"),
         (lambda: kp.DQN((8,), observation_size=4), "has 4 inputs; expected 3"),
         (
-            lambda: kp.DQN((8,), provenance=Provenance(gravity=1000.0)),
-            "the recorded gravity is 1000",
+            lambda: kp.DQN((8,), metadata={"gravity": 1000.0}),
+            "gravity is 1000",
         ),
         (
-            lambda: kp.DQN((8,), provenance=Provenance("Acrobot-v1")),
+            lambda: kp.DQN((8,), metadata={"environment": "Acrobot-v1"}),
             "records the environment 'Acrobot-v1'",
         ),
-        (lambda: kp.DQN((1,) * 400), "more than 1000"),
     ],
 )
 def test_save_weights_refuses_a_network_that_could_not_be_loaded(
@@ -377,7 +344,7 @@ def test_failed_save_keeps_the_old_file(tmp_path: Path) -> None:
         kp.save_weights(network(), tmp_path / "a.h5" / "b.h5")
     with pytest.raises(kp.UserError, match=r"cannot write.*folder"):
         kp.save_weights(network(), tmp_path)
-    with pytest.raises(kp.UserError, match="cannot write"):
+    with pytest.raises(kp.UserError, match=r"cannot write .*: No such file or directory"):
         kp.save_weights(network(), tmp_path / "missing" / "a.h5")
     assert [file.name for file in tmp_path.iterdir()] == ["a.h5"]
     assert_same_values(kp.load_weights(tmp_path / "a.h5"), network())
@@ -413,15 +380,15 @@ def test_save_weights_replaces_the_old_file_and_never_writes_into_it(
 def test_recorded_keras_2_file_loads() -> None:
     loaded = kp.load_weights(DATA / "pendulum_weight.keras2.h5", "tanh")
     assert (loaded.hidden_units, loaded.action_count) == ((512, 256, 128), 41)
-    assert loaded.provenance.gravity is None
+    assert "gravity" not in loaded.metadata
 
 
-def test_keras_file_of_a_dqn_loads_with_its_provenance(tmp_path: Path) -> None:
-    saved = kp.DQN((5, 5, 5, 5), 5, activation="relu", provenance=network().provenance)
+def test_keras_file_of_a_dqn_loads_with_its_metadata(tmp_path: Path) -> None:
+    saved = kp.DQN((5, 5, 5, 5), 5, activation="relu", metadata=network().metadata)
     saved.save(tmp_path / "a.keras")
     loaded = kp.load_weights(tmp_path / "a.keras")
     assert_same_values(loaded, saved)
-    assert (loaded.provenance, loaded.activation) == (saved.provenance, "relu")
+    assert (loaded.metadata, loaded.activation) == (saved.metadata, "relu")
 
 
 def test_activation_is_for_files_that_record_none(tmp_path: Path) -> None:
@@ -439,9 +406,7 @@ def test_activation_is_for_files_that_record_none(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["preset", "config", "activation", "environment", "gravity"])
 def test_attribute_that_is_no_text_is_refused_by_name(name: str, tmp_path: Path) -> None:
     path = tmp_path / "a.h5"
-    kp.save_weights(network(), path)
-    with h5py.File(path, "r+") as file:
-        file["keras_pendulum"].attrs[name] = np.bytes_(b"\xff")
+    make_changed(lambda f: f["keras_pendulum"].attrs.__setitem__(name, np.bytes_(b"\xff")))(path)
     with pytest.raises(kp.WeightsError, match=f"the attribute {name} is neither text nor a number"):
         kp.load_weights(path)
 

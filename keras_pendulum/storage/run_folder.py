@@ -1,0 +1,216 @@
+"""The folder of a run: the only reader and writer of its files.
+
+`find_run` finds the run in a folder; `--resume`, `compare`, `page` and `diagnose` call it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+from keras_pendulum.config.config import Config
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.errors import UserError
+from keras_pendulum.history import EpisodeRecord, csv_header
+from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
+from keras_pendulum.storage.folder_lock import lock_folder
+from keras_pendulum.storage.snapshots import snapshots_file
+
+
+class RunFolder:
+    """The files of a run.
+
+    Args:
+        path: the folder; it may not exist yet.
+        environment: of the run.
+
+    Raises UserError when the folder cannot be read, and when one of the run's files is a link or
+    not a regular file.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], environment: str) -> None:
+        self.path = Path(path)
+        # The real path: a link that changes during the run must not change the folder.
+        self._real_path = Path(os.path.realpath(path))
+        checkpoints = [self._real_path / task.weights_name for task in TASKS.values()]
+        self.weights = self._real_path / TASKS[environment].weights_name
+        self.best = _best_file(self.weights)
+        self.snapshots = snapshots_file(self.weights)
+        others = [file for file in checkpoints if file != self.weights]
+        # Of a run in another environment.
+        self._others = [*others, *map(_best_file, others), *map(snapshots_file, others)]
+        self.history = self._real_path / "history.csv"
+        self.config = self._real_path / "config.json"
+        self.picture = self._real_path / "rewards.png"
+        self.events = self._real_path / "tensorboard"
+        self._evaluated = False  # whether history.csv has the column of the evaluations
+        self.require_not_moved: Callable[[], None] = lambda: None  # see folder_lock.lock_folder
+        try:
+            # Through a link, the run would replace a file of another folder.
+            strange = [
+                file.name
+                for file in (*self.files, *self._others)
+                if file.is_symlink() or (file.exists() and not file.is_file())
+            ]
+        except OSError as error:
+            raise UserError(f"cannot read the folder {path}: {error.strerror}") from error
+        if strange:
+            raise UserError(
+                f"{self.path / strange[0]} is a link, a folder or a device; a run writes a file "
+                "there: remove it, or name another folder with --out"
+            )
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that a finished run leaves in the folder.
+
+        The second is there only with `keep_best`, the third only with `snapshots`.
+        """
+        files = [self.weights, self.best, self.snapshots]
+        return [*files, self.history, self.config, self.picture]
+
+    def create(self) -> None:
+        """Creates the folder if it does not exist. Raises UserError when that fails."""
+        try:
+            self._real_path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
+
+    @contextlib.contextmanager
+    def lock(self) -> Iterator[None]:
+        """Locks the folder against other runs; the system releases the lock of a killed run.
+
+        Raises UserError when another run holds the lock.
+        """
+        with lock_folder(self._real_path) as self.require_not_moved:
+            yield
+
+    def require_unused(self, overwrite: bool) -> None:
+        """Raises UserError when the folder holds a run and `overwrite` is false."""
+        files = [*self.files, *self._others]
+        used = [file.name for file in files if file.exists()]
+        used += [self.events.name] if self._event_files() else []
+        if used and not overwrite:
+            raise UserError(
+                f"{self.path} already holds a run ({', '.join(used)}): continue it with --resume, "
+                "replace it with --overwrite, or name another folder with --out"
+            )
+
+    def require_run(self) -> None:
+        """Raises UserError when the folder holds no checkpoint to resume."""
+        if not self.weights.exists():
+            names = [task.weights_name for task in TASKS.values()]
+            missing = [name for name in names if not (self._real_path / name).exists()]
+            raise UserError(
+                f"{self.path} holds no run to continue (no {' or '.join(missing)}): leave out "
+                "--resume to start a run, or name the folder of one with --out"
+            )
+
+    def remove_old_run(self) -> None:
+        """Removes the files of another run, after the new run's first checkpoint is written.
+
+        Raises UserError when one cannot be removed.
+        """
+        _remove(self.best, self.snapshots, *self._others)
+        if events := self._event_files():
+            _remove(*events)
+            with contextlib.suppress(OSError):  # the folder holds other files too
+                self.events.rmdir()
+
+    def start_files(self, config: Config, history: Sequence[EpisodeRecord]) -> None:
+        """Writes the settings and the history so far, and removes temporary files and the picture.
+
+        Raises UserError when the folder cannot be written.
+        """
+        for file in (*self.files, *self._others):
+            _remove(*self._real_path.glob(f".{file.name}.*.tmp"))
+        _remove(self.picture)
+        self._evaluated = config.evaluate_every > 0 or not all(
+            math.isnan(record.greedy_regret) for record in history
+        )
+        write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
+        self._write_history(history)
+
+    def append(self, record: EpisodeRecord) -> None:
+        """Adds a row to history.csv, unless the file was removed; see `restore_history`.
+
+        Raises UserError when the row cannot be written.
+        """
+        self.require_not_moved()
+        try:
+            # Not mode "a": it would make a file without the rows before.
+            with retry_while_open(
+                lambda: open(self.history, "r+", encoding="ascii", newline="")
+            ) as file:
+                file.seek(0, os.SEEK_END)
+                file.write(record.csv_row(self._evaluated) + "\n")
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            raise UserError(f"cannot write {self.history}: {error.strerror}") from error
+
+    def restore_history(self, history: Iterable[EpisodeRecord]) -> None:
+        """Writes history.csv again if it was removed during the run.
+
+        Raises UserError when it cannot be written.
+        """
+        if not self.history.exists():
+            self._write_history(history)
+
+    def _write_history(self, history: Iterable[EpisodeRecord]) -> None:
+        evaluated = self._evaluated
+        lines = [csv_header(evaluated), *(record.csv_row(evaluated) for record in history)]
+        write_atomically(self.history, "".join(line + "\n" for line in lines).encode())
+
+    def _event_files(self) -> list[Path]:
+        # By their names: a folder called tensorboard may hold other files.
+        return list(self.events.glob("events.out.tfevents.*"))
+
+
+def find_run(path: str | os.PathLike[str]) -> RunFolder:
+    """Returns the folder of a run that has a checkpoint.
+
+    Raises UserError for anything else, and for a folder with the checkpoints of two environments.
+    """
+    folder = Path(path)
+    names = {task.weights_name: task.environment for task in TASKS.values()}
+    try:
+        found = [name for name in names if (folder / name).is_file()]
+        if not found and not folder.is_dir():
+            kind = "a file" if folder.exists() else "no such folder"
+            raise UserError(f"{folder}: {kind}; expected the folder of a run")
+    except OSError as error:
+        raise UserError(f"{folder}: {error.strerror}; expected the folder of a run") from error
+    if not found:
+        raise UserError(f"{folder}: holds no run (no {' or '.join(names)})")
+    if len(found) > 1:
+        raise UserError(f"{folder}: holds {' and '.join(found)}: move one to another folder")
+    return RunFolder(folder, names[found[0]])
+
+
+def find_run_if_folder(path: object) -> RunFolder | None:
+    """Returns the folder of a run, None where `path` is not a folder. Raises as `find_run` does."""
+    try:
+        is_folder = isinstance(path, (str, os.PathLike)) and Path(path).is_dir()
+    except (OSError, ValueError):  # a name that no file can have
+        is_folder = False
+    return find_run(path) if is_folder else None  # type: ignore[arg-type]
+
+
+def _best_file(weights: Path) -> Path:
+    """Returns the file of the best weights beside a checkpoint: `pendulum_weight_best.h5`."""
+    return weights.with_name(f"{weights.stem}_best{weights.suffix}")
+
+
+def _remove(*files: Path) -> None:
+    for file in files:
+        try:
+            retry_while_open(partial(file.unlink, missing_ok=True))
+        except OSError as error:
+            raise UserError(f"cannot replace {file}: {error.strerror}") from error
