@@ -11,11 +11,10 @@ import numpy as np
 import tensorflow as tf
 from numpy.typing import NDArray
 
-from keras_pendulum.dqn.losses import double_td_target, td_target
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.dqn.policy import GreedyPolicy, greedy_policy
 from keras_pendulum.dqn.replay_buffer import Transitions
-from keras_pendulum.dqn.target_network import TargetUpdate
+from keras_pendulum.dqn.target_network import TargetRule, TargetUpdate
 
 Variables = dict[str, NDArray[Any]]  # values by the variables' paths
 
@@ -26,20 +25,18 @@ class Agent:
 
     online: DQN  # the network that acts and learns
     target: DQN  # the network that values the next observations
+    target_rule: TargetRule  # makes the TD targets
     update_target: TargetUpdate  # changes `target` after each gradient step
     optimizer: keras.optimizers.Optimizer  # for `online`
     # Returns a scalar from Q-values [B, A], actions [B] and TD targets [B].
     loss: Callable[[tf.Tensor, tf.Tensor, tf.Tensor], tf.Tensor]
     discount: float  # γ
-    double_q: bool  # true where `online` chooses the next action that `target` values
     rng: np.random.RandomState  # random-number generator of the exploration
 
     def __post_init__(self) -> None:
         self.policy = greedy_policy(self.online)
         self.optimizer.build(self.online.trainable_variables)
         self._compiled: dict[tuple[int, ...], Callable[..., Any]] = {}  # by the batches' shape
-        # Called before a compilation, which takes about a second.
-        self.on_compile: Callable[[], object] = lambda: None
 
     def select_action(self, observation: NDArray[np.float32], epsilon: float) -> int:
         """Returns a random action with probability ε, else the greedy one of observation [D]."""
@@ -47,19 +44,21 @@ class Agent:
             return int(self.rng.randint(self.online.action_count))
         return self.policy.action(observation)
 
+    def is_compiled(self, batches: Transitions) -> bool:
+        """Returns false where `update` must compile first, which takes about a second."""
+        return batches.action.shape in self._compiled
+
     def update(self, batches: Transitions) -> NDArray[np.float32]:
         """Makes one gradient step for each of the batches [K, B, ...]; returns the losses [K].
 
         All K steps run in one compiled call, because a call costs more than a step.
         """
         tensors = [tf.constant(field) for field in batches]
-        shape = batches.action.shape
-        if shape not in self._compiled:
-            self.on_compile()
+        if not self.is_compiled(batches):
             # A concrete function, because a plain tf.function checks its arguments at each call.
             steps = tf.function(self._gradient_steps, jit_compile=True, autograph=False)
-            self._compiled[shape] = steps.get_concrete_function(*tensors)
-        losses, weights = self._compiled[shape](*tensors)
+            self._compiled[batches.action.shape] = steps.get_concrete_function(*tensors)
+        losses, weights = self._compiled[batches.action.shape](*tensors)
         self.policy = GreedyPolicy([each.numpy() for each in weights], self.online.activation)
         return losses.numpy()
 
@@ -71,13 +70,7 @@ class Agent:
 
     def gradient_step(self, batch: Transitions) -> tf.Tensor:
         """Makes one gradient step from a batch [B, ...]; returns its loss, a scalar."""
-        next_q = self.target(batch.next_observation)  # [B, A]
-        outcome = (batch.reward, batch.terminated, next_q)
-        if self.double_q:
-            next_q_online = self.online(batch.next_observation)  # [B, A]
-            target = double_td_target(*outcome, next_q_online, self.discount)  # [B]
-        else:
-            target = td_target(*outcome, self.discount)  # [B]
+        target = self.target_rule(self.online, self.target, batch, self.discount)  # [B]
         with tf.GradientTape() as tape:
             q = self.online(batch.observation)  # [B, A]
             loss = self.loss(q, batch.action, target)
@@ -94,23 +87,18 @@ class Agent:
             self.policy = greedy_policy(self.online)
 
     def get_state(self) -> dict[str, Variables]:
-        """Returns copies of the variables of `target` and `optimizer`, by their paths.
-
-        The online weights are not among them: a checkpoint holds them as Keras's layers.
-        """
+        """Returns copies of the variables of `online`, `target` and `optimizer`."""
         return {
             group: {variable.path: np.asarray(variable.numpy()) for variable in variables}
             for group, variables in self._groups().items()
         }
 
-    def set_state(self, weights: list[NDArray[np.float32]], state: dict[str, Variables]) -> None:
-        """Restores the online weights and a state of `get_state`.
+    def set_state(self, state: dict[str, Variables]) -> None:
+        """Restores a state of `get_state`.
 
         Raises ValueError, and changes nothing, when the variables have other paths or shapes.
         """
-        groups = {**self._groups(), "online": self.online.weights}
-        paths = [variable.path for variable in groups["online"]]
-        state = {**state, "online": dict(zip(paths, weights, strict=True))}
+        groups = self._groups()
         for group, variables in groups.items():
             expected = {variable.path: tuple(variable.shape) for variable in variables}
             found = {path: array.shape for path, array in state.get(group, {}).items()}
@@ -122,4 +110,8 @@ class Agent:
         self.policy = greedy_policy(self.online)
 
     def _groups(self) -> dict[str, list[keras.Variable]]:
-        return {"target": self.target.weights, "optimizer": self.optimizer.variables}
+        return {
+            "online": self.online.weights,
+            "target": self.target.weights,
+            "optimizer": self.optimizer.variables,
+        }

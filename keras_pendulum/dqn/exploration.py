@@ -4,42 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from keras_pendulum.config.config import Config
-
-# Returns ε from the episode's index and the environment steps since the start of the run.
+# Returns ε from the episode's index and the environment steps since the start of the run. `partial`
+# makes one of each function below.
 Schedule = Callable[[int, int], float]
 
 
-@dataclass(frozen=True)
-class EpsilonByEpisodes:
-    """A schedule that multiplies ε by `decay` before each episode, down to `minimum`."""
-
-    start: float
-    decay: float
-    minimum: float
-
-    def __call__(self, episode: int, steps: int) -> float:
-        """Returns ε of the episode."""
-        return max(self.minimum, self.start * self.decay ** (episode + 1))
+def epsilon_by_episodes(
+    start: float, decay: float, minimum: float, episode: int, steps: int
+) -> float:
+    """Returns ε of an episode: multiplied by `decay` before each one, down to `minimum`."""
+    return max(minimum, start * decay ** (episode + 1))
 
 
-@dataclass(frozen=True)
-class EpsilonBySteps:
-    """A schedule in which ε falls exponentially with the environment steps to `minimum`."""
-
-    start: float
-    decay_steps: float
-    minimum: float
-
-    def __call__(self, episode: int, steps: int) -> float:
-        """Returns ε of the step that follows `steps` steps."""
-        return self.minimum + (self.start - self.minimum) * math.exp(-steps / self.decay_steps)
-
-
-def make_schedule(config: Config) -> Schedule:
-    """Returns the schedule of the settings."""
-    if config.epsilon_schedule == "steps":
-        return EpsilonBySteps(config.epsilon_start, config.epsilon_decay_steps, config.epsilon_min)
-    return EpsilonByEpisodes(config.epsilon_start, config.epsilon_decay, config.epsilon_min)
+def epsilon_by_steps(
+    start: float, decay_steps: float, minimum: float, episode: int, steps: int
+) -> float:
+    """Returns ε of the next step: it falls exponentially with the steps before, to `minimum`."""
+    return minimum + (start - minimum) * math.exp(-steps / decay_steps)

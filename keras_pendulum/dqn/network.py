@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
-from functools import partial
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,17 +13,7 @@ from keras_pendulum.dqn.policy import activations_of
 REGISTERED_NAME = "keras_pendulum>DQN"  # in the files of Keras
 _SPREAD = 0.3  # limit of the hidden biases of `spread`
 _DTYPE = "float32"  # also where the user's keras.json names another one
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """The run that a network comes from, as far as its file records it."""
-
-    environment: str = "Pendulum-v1"
-    gravity: float | None = None  # m/s²
-    preset: str | None = None
-    seed: int | None = None
-    config: str | None = None  # the settings of the run, as JSON
+_SIZES = ("hidden_units", "action_count", "observation_size", "activation")
 
 
 @keras.saving.register_keras_serializable("keras_pendulum")
@@ -36,6 +24,8 @@ class DQN(keras.Model):
     constructor builds the weights. They depend on `seed` alone and are uniform. `glorot`: within
     ±√(6 / (inputs + outputs)), biases 0. `fan-in`: within ±1/√inputs, biases too. `spread`: as
     `glorot`, but the first kernel within ±1/√inputs and the hidden biases within ±0.3.
+
+    `metadata` holds JSON values by name, such as the task of a run. Copies and files keep it.
     """
 
     def __init__(
@@ -47,47 +37,42 @@ class DQN(keras.Model):
         activation: str = "tanh",
         initial_weights: str = "glorot",
         seed: int = 0,
-        provenance: Provenance | None = None,
+        metadata: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__(name="dqn", dtype=_DTYPE)
         self.hidden_units = tuple(hidden_units)
         self.action_count = action_count
         self.observation_size = observation_size
         self.activation = activation
-        self.provenance = provenance or Provenance()
+        self.metadata = dict(metadata or {})
         seeds = keras.random.SeedGenerator(seed)
 
-        def dense(name: str, inputs: int, units: int, activation: str | None) -> keras.layers.Dense:
-            layer = partial(keras.layers.Dense, units, activation, name=name, dtype=_DTYPE)
+        def uniform(limit: float) -> keras.initializers.Initializer:
+            return keras.initializers.RandomUniform(-limit, limit, seed=seeds)
 
-            def uniform(limit: float) -> keras.initializers.Initializer:
-                return keras.initializers.RandomUniform(-limit, limit, seed=seeds)
-
-            fan_in = uniform(inputs**-0.5)
+        widths = (observation_size, *hidden_units, action_count)
+        names = [*activations_of(activation, len(self.hidden_units)), None]
+        layers = []
+        for i, ((inputs, units), name) in enumerate(zip(pairwise(widths), names, strict=True)):
+            kernel, bias = keras.initializers.GlorotUniform(seed=seeds), "zeros"
             if initial_weights == "fan-in":
-                return layer(kernel_initializer=fan_in, bias_initializer=fan_in)
-            glorot = keras.initializers.GlorotUniform(seed=seeds)
-            if initial_weights == "glorot" or name == "head":
-                return layer(kernel_initializer=glorot)
-            kernel = fan_in if name == "hidden_0" else glorot
-            return layer(kernel_initializer=kernel, bias_initializer=uniform(_SPREAD))
-
-        widths = (observation_size, *hidden_units)
-        names = activations_of(activation, len(self.hidden_units))
-        self.hidden = [
-            dense(f"hidden_{i}", inputs, units, name)
-            for i, ((inputs, units), name) in enumerate(zip(pairwise(widths), names, strict=True))
-        ]
-        self.head = dense("head", widths[-1], action_count, None)
-        self.build((None, observation_size))
-
-    def build(self, input_shape: tuple[int | None, int]) -> None:
-        """Creates the weights, once. `input_shape` is (None, D)."""
-        for layer in (*self.hidden, self.head):
-            if not layer.built:
-                layer.build(input_shape)
-            input_shape = (None, layer.units)
-        self.built = self._called = True  # Keras exports no model before its first call
+                kernel = bias = uniform(inputs**-0.5)
+            elif initial_weights == "spread" and name is not None:
+                kernel = uniform(inputs**-0.5) if i == 0 else kernel
+                bias = uniform(_SPREAD)
+            layer = keras.layers.Dense(
+                units,
+                name,
+                kernel_initializer=kernel,
+                bias_initializer=bias,
+                name="head" if name is None else f"hidden_{i}",
+                dtype=_DTYPE,
+            )
+            with keras.name_scope(self.name):  # a part of the variables' paths
+                layer.build((None, inputs))
+            layers.append(layer)
+        *self.hidden, self.head = layers
+        self(keras.ops.zeros((1, observation_size)))  # Keras exports no model before its first call
 
     def call(self, observation: Any) -> Any:
         """Returns the Q-values [B, A] of observations [B, D]."""
@@ -104,11 +89,11 @@ class DQN(keras.Model):
 
     def get_config(self) -> dict[str, Any]:
         """Returns the arguments for `from_config`; Keras copies and saves networks with both."""
-        names = ("hidden_units", "action_count", "observation_size", "activation")
-        return {name: getattr(self, name) for name in names} | asdict(self.provenance)
+        return {name: getattr(self, name) for name in _SIZES} | self.metadata
 
     @classmethod
     def from_config(cls, config: dict[str, Any]) -> DQN:
         """Returns a network with new weights."""
-        run = Provenance(*(config[field.name] for field in fields(Provenance)))
-        return cls(**{key: config[key] for key in config.keys() - vars(run)}, provenance=run)
+        sizes = {name: config[name] for name in _SIZES}
+        metadata = {name: config[name] for name in config if name not in _SIZES}
+        return cls(**sizes, metadata=metadata)

@@ -22,11 +22,9 @@ class RandomStreams:
 
     def get_state(self) -> dict[str, Any]:
         """Returns the state of both streams in types that JSON can hold."""
-        name, keys, position, has_gauss, gauss = self.exploration.get_state(legacy=True)
-        return {
-            "exploration": [name, np.asarray(keys).tolist(), position, has_gauss, gauss],
-            "replay": self.replay.getstate(),
-        }
+        name, keys, *rest = self.exploration.get_state(legacy=True)
+        words = np.asarray(keys).tolist()
+        return {"exploration": [name, words, *rest], "replay": self.replay.getstate()}
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Restores a state of `get_state`, also after a round trip through JSON.

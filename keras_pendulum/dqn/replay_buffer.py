@@ -6,7 +6,7 @@ import random
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 
 class Transitions(NamedTuple):
@@ -25,12 +25,10 @@ class Transitions(NamedTuple):
 class ReplayBuffer:
     """A ring of the last `capacity` transitions (Mnih et al. 2015, Methods).
 
-    Args:
-        capacity: number of transitions.
-        observation_size: D.
+    `observation_size` is D, how many numbers an observation has.
     """
 
-    def __init__(self, capacity: int, observation_size: int = 3) -> None:
+    def __init__(self, capacity: int, observation_size: int) -> None:
         self.capacity = capacity
         self.added = 0  # transitions since the start of the run
         self._arrays = Transitions(
@@ -44,22 +42,12 @@ class ReplayBuffer:
     def __len__(self) -> int:
         return min(self.added, self.capacity)
 
-    def add(
-        self,
-        observation: ArrayLike,
-        action: int,
-        reward: float,
-        next_observation: ArrayLike,
-        terminated: bool,
-    ) -> None:
-        """Stores one transition; it replaces the oldest one when the buffer is full."""
-        slot = self.added % self.capacity
-        arrays = self._arrays
-        arrays.observation[slot] = observation
-        arrays.action[slot] = action
-        arrays.reward[slot] = reward
-        arrays.next_observation[slot] = next_observation
-        arrays.terminated[slot] = terminated
+    def add(self, *transition: Any) -> None:
+        """Stores the fields of one of the `Transitions`, in place of the oldest when full."""
+        i = self.added % self.capacity
+        # Without a loop, because this is done at each step.
+        observations, actions, rewards, next_observations, ends = self._arrays
+        observations[i], actions[i], rewards[i], next_observations[i], ends[i] = transition
         self.added += 1
 
     def sample(self, batch_size: int, rng: random.Random, batches: int = 1) -> Transitions:
@@ -68,28 +56,34 @@ class ReplayBuffer:
         Raises ValueError when fewer than `batch_size` transitions are stored.
         """
         stored = range(len(self))  # 0 is the oldest, as in the recorded run
-        positions = np.array([rng.sample(stored, batch_size) for _ in range(batches)])  # [K, B]
-        slots = (self.added - len(self) + positions) % self.capacity
+        positions = [rng.sample(stored, batch_size) for _ in range(batches)]  # [K, B]
+        slots = self._slots(np.array(positions))
         return Transitions(*(array.take(slots, axis=0) for array in self._arrays))
 
-    def get_state(self) -> dict[str, NDArray[Any]]:
-        """Returns copies of all stored transitions, oldest first, one array per field."""
-        oldest = (self.added - len(self)) % self.capacity
-        return {
-            name: np.concatenate([array[oldest : len(self)], array[:oldest]])
-            for name, array in self._arrays._asdict().items()
-        }
+    def transitions(self) -> Transitions:
+        """Returns copies of all stored transitions, oldest first."""
+        slots = self._slots(np.arange(len(self)))
+        return Transitions(*(array.take(slots, axis=0) for array in self._arrays))
 
-    def set_state(self, state: dict[str, NDArray[Any]], added: int) -> None:
-        """Restores the transitions of `get_state` and the number `added`.
+    def get_state(self) -> dict[str, Any]:
+        """Returns the number `added`, and the fields of `transitions` by their names."""
+        return {"added": self.added, **self.transitions()._asdict()}
 
-        Raises ValueError when a buffer of this capacity cannot hold them.
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Restores a state of `get_state`.
+
+        Raises ValueError, and changes nothing, when a buffer of this capacity cannot hold it.
         """
-        stored = min(added, self.capacity)
-        for name, array in self._arrays._asdict().items():
-            if state[name].shape != (stored, *array.shape[1:]):
+        added = state["added"]
+        arrays = self._arrays._asdict()
+        for name, array in arrays.items():
+            if state[name].shape != (min(added, self.capacity), *array.shape[1:]):
                 raise ValueError(f"{name} of {added} transitions has shape {state[name].shape}")
         self.added = added
-        slots = (added - stored + np.arange(stored)) % self.capacity
-        for name, array in self._arrays._asdict().items():
+        slots = self._slots(np.arange(len(self)))
+        for name, array in arrays.items():
             array[slots] = state[name]
+
+    def _slots(self, positions: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Returns the rows of the arrays at these positions, of which 0 is the oldest."""
+        return (self.added - len(self) + positions) % self.capacity

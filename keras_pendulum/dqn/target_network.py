@@ -1,4 +1,4 @@
-"""The target network, and the rules that update it."""
+"""The target network: the rules that make TD targets with it, and those that update it."""
 
 from __future__ import annotations
 
@@ -6,47 +6,42 @@ from collections.abc import Callable
 
 import tensorflow as tf
 
-from keras_pendulum.config.config import Config
+from keras_pendulum.dqn.losses import double_td_target, td_target
 from keras_pendulum.dqn.network import DQN
+from keras_pendulum.dqn.replay_buffer import Transitions
 
-# Called after each gradient step, inside the compiled loop, with the online network, the target
-# network and the number of gradient steps so far (a scalar integer tensor).
+# Returns the TD targets [B] from the online network, the target network, a batch [B, ...] and γ.
+TargetRule = Callable[[DQN, DQN, Transitions, float], tf.Tensor]
+# Called after each gradient step with the online network, the target network and the number of
+# gradient steps so far, an integer tensor. `partial` makes one of `soft_update` or `hard_update`.
 TargetUpdate = Callable[[DQN, DQN, tf.Tensor], None]
 
 
-def make_target(online: DQN, config: Config) -> tuple[DQN, TargetUpdate]:
-    """Returns the target network and its update rule.
-
-    `target_update="none"` is the original's defect `no-target-network`: the online network is its
-    own target.
-    """
-    if config.target_update == "none":
-        return online, _no_update
-    if config.target_update == "hard":
-        return online.clone(), hard_update(config.target_period)
-    return online.clone(), soft_update(config.tau)
+def q_learning(online: DQN, target: DQN, batch: Transitions, discount: float) -> tf.Tensor:
+    """Returns the TD targets [B] with next actions that `target` chooses and values."""
+    next_q = target(batch.next_observation)  # [B, A]
+    return td_target(batch.reward, batch.terminated, next_q, discount)
 
 
-def soft_update(tau: float) -> TargetUpdate:
-    """Returns the rule target ← tau·online + (1 - tau)·target (Lillicrap et al. 2016, alg. 1)."""
-
-    def update(online: DQN, target: DQN, steps: tf.Tensor) -> None:
-        for source, destination in zip(online.weights, target.weights, strict=True):
-            destination.assign(tau * source + (1.0 - tau) * destination)
-
-    return update
+def double_q_learning(online: DQN, target: DQN, batch: Transitions, discount: float) -> tf.Tensor:
+    """Returns the TD targets [B] with next actions that `online` chooses and `target` values."""
+    next_q = target(batch.next_observation)  # [B, A]
+    next_q_online = online(batch.next_observation)  # [B, A]
+    return double_td_target(batch.reward, batch.terminated, next_q, next_q_online, discount)
 
 
-def hard_update(period: int) -> TargetUpdate:
-    """Returns the rule target ← online at every `period`-th gradient step (Mnih et al. 2015)."""
-
-    def update(online: DQN, target: DQN, steps: tf.Tensor) -> None:
-        due = tf.equal(steps % period, 0)
-        for source, destination in zip(online.weights, target.weights, strict=True):
-            destination.assign(tf.where(due, source, destination))
-
-    return update
+def soft_update(tau: float, online: DQN, target: DQN, steps: tf.Tensor) -> None:
+    """Moves target ← tau·online + (1 - tau)·target (Lillicrap et al. 2016, algorithm 1)."""
+    for source, destination in zip(online.weights, target.weights, strict=True):
+        destination.assign(tau * source + (1.0 - tau) * destination)
 
 
-def _no_update(online: DQN, target: DQN, steps: tf.Tensor) -> None:
-    """Does nothing: the target network is the online network."""
+def hard_update(period: int, online: DQN, target: DQN, steps: tf.Tensor) -> None:
+    """Copies target ← online at every `period`-th gradient step (Mnih et al. 2015)."""
+    due = tf.equal(steps % period, 0)
+    for source, destination in zip(online.weights, target.weights, strict=True):
+        destination.assign(tf.where(due, source, destination))
+
+
+def no_update(online: DQN, target: DQN, steps: tf.Tensor) -> None:
+    """Does nothing: the online network is its own target, the original's `no-target-network`."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import keras
@@ -11,15 +13,23 @@ import pytest
 import tensorflow as tf
 from numpy.typing import NDArray
 
-import keras_pendulum as kp
-from keras_pendulum.dqn.agent import Agent
+from keras_pendulum.dqn.agent import Agent, Variables
 from keras_pendulum.dqn.losses import huber, mean_squared_error
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.dqn.replay_buffer import Transitions
-from keras_pendulum.dqn.target_network import make_target
+from keras_pendulum.dqn.target_network import (
+    TargetRule,
+    TargetUpdate,
+    double_q_learning,
+    hard_update,
+    no_update,
+    q_learning,
+    soft_update,
+)
 
 OBSERVATION = np.array([1, 0, 0], np.float32)  # [D]
+SOFT: TargetUpdate = partial(soft_update, 0.25)
 Weights = list[NDArray[np.float32]]
 
 
@@ -29,18 +39,19 @@ def make_agent(
     optimizer: keras.optimizers.Optimizer | None = None,
     loss: Callable[..., tf.Tensor] = mean_squared_error,
     discount: float = 0.9,
-    double_q: bool = False,
-    target_update: str = "soft",
+    target_rule: TargetRule = q_learning,
+    update_target: TargetUpdate = SOFT,
     seed: int = 0,
 ) -> Agent:
     online = online or DQN((8,), seed=seed)
     return Agent(
         online,
-        *make_target(online, kp.preset("reference", target_update=target_update, target_period=3)),
+        online if update_target is no_update else online.clone(),
+        target_rule,
+        update_target,
         optimizer or keras.optimizers.Adam(0.01, name="adam"),
         loss,
         discount,
-        double_q,
         np.random.RandomState(seed),
     )
 
@@ -77,32 +88,32 @@ def linear_agent(**settings: Any) -> Agent:
     return make_agent(
         network,
         optimizer=keras.optimizers.SGD(0.1),
-        target_update="none",
+        update_target=no_update,
         discount=0.5,
         **settings,
     )
 
 
-def values(agent: Agent) -> list[Weights]:
-    """Returns copies of all variables of the agent."""
-    groups = (agent.online.weights, agent.target.weights, agent.optimizer.variables)
-    return [[variable.numpy().copy() for variable in group] for group in groups]
+def assert_equal(ours: dict[str, Variables], theirs: dict[str, Variables]) -> None:
+    for group, arrays in ours.items():
+        assert_weights(list(arrays.values()), list(theirs[group].values()))
 
 
-def assert_equal(ours: list[Weights], theirs: list[Weights]) -> None:
+def assert_weights(ours: Weights, theirs: Weights, rtol: float = 0, atol: float = 0) -> None:
     for mine, yours in zip(ours, theirs, strict=True):
-        for one, other in zip(mine, yours, strict=True):
-            np.testing.assert_array_equal(one, other)
+        np.testing.assert_allclose(mine, yours, rtol, atol)
 
 
-def other_state() -> tuple[Weights, dict[str, dict[str, NDArray[Any]]]]:
-    """Returns weights and a state that differ from those of `make_agent()` in every variable."""
-    agent = make_agent(seed=9)
-    state = {
+def differ(ours: Weights, theirs: Weights) -> bool:
+    return any((mine != yours).any() for mine, yours in zip(ours, theirs, strict=True))
+
+
+def other_state() -> dict[str, Variables]:
+    """Returns a state that differs from that of `make_agent()` in every variable."""
+    return {
         group: {path: array + 1 for path, array in arrays.items()}
-        for group, arrays in agent.get_state().items()
+        for group, arrays in make_agent(seed=9).get_state().items()
     }
-    return [array + 1 for array in agent.online.get_weights()], state
 
 
 @pytest.mark.parametrize(("draw", "explores"), [(0.29, True), (0.3, True), (0.31, False)])
@@ -135,24 +146,6 @@ def test_actions_are_drawn_as_in_the_recorded_run() -> None:
     assert [agent.select_action(OBSERVATION, 0.5) for _ in range(100)] == expected
 
 
-@pytest.mark.parametrize("count", [2, 41])
-def test_actions_are_uniform_with_epsilon_1(count: int) -> None:
-    agent = make_agent(DQN((8,), count))
-    actions = [agent.select_action(OBSERVATION, 1.0) for _ in range(1000 * count)]
-    assert {type(action) for action in actions} == {int}
-    counts = np.bincount(actions)
-    assert len(counts) == count
-    assert counts.min() > 850
-    assert counts.max() < 1150
-
-
-def test_actions_are_greedy_with_epsilon_0() -> None:
-    agent = make_agent()
-    for observation in random_batches(1, 50).observation[0]:
-        greedy = int(agent.online(observation[np.newaxis]).numpy().argmax())
-        assert agent.select_action(observation, 0.0) == greedy
-
-
 def test_gradient_step_of_a_terminated_transition_is_that_computed_by_hand() -> None:
     agent = linear_agent()
     (loss,) = agent.update(one_transition(action=1, reward=-3, terminated=True))
@@ -180,13 +173,38 @@ def test_gradient_step_minimizes_the_given_loss() -> None:
     np.testing.assert_allclose(agent.online.get_weights()[1], [1, -0.1], rtol=1e-6)
 
 
-@pytest.mark.parametrize(("double_q", "next_value"), [(False, 5.0), (True, 2.0)])
-def test_target_network_values_the_next_observation(double_q: bool, next_value: float) -> None:
-    agent = linear_agent(double_q=double_q)
+@pytest.mark.parametrize(("rule", "next_value"), [(q_learning, 5.0), (double_q_learning, 2.0)])
+def test_target_network_values_the_next_observation(rule: TargetRule, next_value: float) -> None:
+    agent = linear_agent(target_rule=rule)
     agent.target = agent.online.clone()
     agent.target.set_weights([np.zeros((3, 2)), np.array([2, 5])])  # the online choice is action 0
     (loss,) = agent.update(one_transition(action=1, reward=-1, terminated=False))
     assert loss == pytest.approx((-1 + 0.5 * next_value) ** 2 / 2)
+
+
+def test_target_changes_at_hard_updates_only() -> None:
+    agent = make_agent(update_target=partial(hard_update, 5))
+    initial = agent.target.get_weights()
+    agent.update(random_batches(4))
+    assert differ(agent.online.get_weights(), initial)
+    assert_weights(agent.target.get_weights(), initial)
+    agent.update(random_batches(1))
+    copied = agent.online.get_weights()
+    assert_weights(agent.target.get_weights(), copied)
+    agent.update(random_batches(4))
+    assert differ(agent.online.get_weights(), copied)
+    assert_weights(agent.target.get_weights(), copied)
+
+
+@pytest.mark.parametrize("tau", [0.0, 0.25])  # with 0, the optimizer alone could change the target
+def test_soft_update_follows_each_gradient_step(tau: float) -> None:
+    agent = make_agent(update_target=partial(soft_update, tau))
+    expected = agent.target.get_weights()
+    for _ in range(3):
+        agent.update(random_batches(1))
+        pairs = zip(agent.online.get_weights(), expected, strict=True)
+        expected = [tau * ours + (1 - tau) * theirs for ours, theirs in pairs]
+        assert_weights(agent.target.get_weights(), expected, rtol=3e-7, atol=1e-8)
 
 
 def test_update_makes_one_gradient_step_for_each_batch() -> None:
@@ -200,9 +218,10 @@ def test_update_makes_one_gradient_step_for_each_batch() -> None:
     ]
     np.testing.assert_allclose(losses, single, rtol=1e-5)
     assert int(together.optimizer.iterations) == 5
-    for ours, theirs in zip(values(together), values(one_by_one), strict=True):
-        for mine, yours in zip(ours, theirs, strict=True):
-            np.testing.assert_allclose(mine, yours, rtol=1e-4, atol=1e-6)
+    states = together.get_state(), one_by_one.get_state()
+    for group in states[0]:
+        ours, theirs = (list(state[group].values()) for state in states)
+        assert_weights(ours, theirs, rtol=1e-4, atol=1e-6)
 
 
 def test_update_is_compiled_once_for_each_shape() -> None:
@@ -213,14 +232,11 @@ def test_update_is_compiled_once_for_each_shape() -> None:
         return mean_squared_error(*batch)
 
     agent = make_agent(loss=loss)
-    compiled = []
-    for batches in (2, 2, 3, 2, 3):
+    for batches, is_compiled in [(2, False), (2, True), (3, False), (2, True), (3, True)]:
+        before = len(traces)
+        assert agent.is_compiled(random_batches(batches)) == is_compiled
         agent.update(random_batches(batches))
-        compiled.append(len(traces))
-    assert compiled[0] > 0
-    assert compiled[1] == compiled[0]
-    assert compiled[2] > compiled[1]
-    assert compiled[2:] == [compiled[2]] * 3
+        assert (len(traces) == before) == is_compiled
 
 
 def test_update_makes_the_agent_act_on_the_new_weights() -> None:
@@ -236,35 +252,26 @@ def test_update_makes_the_agent_act_on_the_new_weights() -> None:
     np.testing.assert_array_equal(old_policy.q_values(OBSERVATION), old_q)
 
 
-@pytest.mark.parametrize("target_update", ["soft", "none"])
-def test_set_state_continues_like_the_saved_agent(target_update: str) -> None:
-    saved = make_agent(target_update=target_update)
+@pytest.mark.parametrize("update_target", [SOFT, no_update])
+def test_set_state_continues_like_the_saved_agent(update_target: TargetUpdate) -> None:
+    saved = make_agent(update_target=update_target)
     saved.update(random_batches(4))
-    weights, state = saved.online.get_weights(), saved.get_state()
-    restored = make_agent(target_update=target_update, seed=9)
+    state = saved.get_state()
+    restored = make_agent(update_target=update_target, seed=9)
     restored.update(random_batches(4, seed=9))  # its compiled update uses the restored variables
-    restored.set_state(weights, state)
-    assert_equal(values(restored), values(saved))
+    restored.set_state(state)
+    q = saved.policy.q_values(OBSERVATION)
+    np.testing.assert_array_equal(restored.policy.q_values(OBSERVATION), q)
     for agent in (saved, restored):
         agent.update(random_batches(4, seed=1))
-    assert_equal(values(restored), values(saved))
-
-
-def test_set_state_restores_the_greedy_policy() -> None:
-    agent = make_agent()
-    q = agent.policy.q_values(OBSERVATION)
-    weights, state = agent.online.get_weights(), agent.get_state()
-    agent.set_state(*other_state())
-    assert (agent.policy.q_values(OBSERVATION) != q).any()
-    agent.set_state(weights, state)
-    np.testing.assert_array_equal(agent.policy.q_values(OBSERVATION), q)
+    assert_equal(restored.get_state(), saved.get_state())
 
 
 def test_get_state_names_the_variables_by_their_paths() -> None:
     layers = ("hidden_0/kernel", "hidden_0/bias", "head/kernel", "head/bias")
     state = make_agent().get_state()
-    assert set(state) == {"target", "optimizer"}
-    assert set(state["target"]) == {f"dqn/{layer}" for layer in layers}
+    assert set(state) == {"online", "target", "optimizer"}
+    assert set(state["online"]) == set(state["target"]) == {f"dqn/{layer}" for layer in layers}
     moments = {
         f"adam/dqn_{layer.replace('/', '_')}_{moment}"
         for layer in layers
@@ -276,63 +283,36 @@ def test_get_state_names_the_variables_by_their_paths() -> None:
 def test_get_state_is_a_copy() -> None:
     agent = make_agent()
     state = agent.get_state()
-    before = {path: array.copy() for group in state.values() for path, array in group.items()}
+    before = copy.deepcopy(state)
     agent.update(random_batches(2))
-    for group in state.values():
-        for path, array in group.items():
-            np.testing.assert_array_equal(array, before[path])
+    assert_equal(state, before)
 
 
-def remove(arrays: dict[str, NDArray[Any]], path: str) -> None:
-    del arrays[path]
-
-
-def add(arrays: dict[str, NDArray[Any]], path: str) -> None:
-    arrays["other/kernel"] = arrays[path]
-
-
-def rename(arrays: dict[str, NDArray[Any]], path: str) -> None:
-    arrays["other/kernel"] = arrays.pop(path)
-
-
-def transpose(arrays: dict[str, NDArray[Any]], path: str) -> None:
-    arrays[path] = arrays[path].T
-
-
-def shorten(arrays: dict[str, NDArray[Any]], path: str) -> None:
-    arrays[path] = arrays[path][:1]
-
-
-@pytest.mark.parametrize("change", [remove, add, rename, transpose, shorten])
+@pytest.mark.parametrize("change", ["remove", "add", "rename", "transpose", "shorten"])
 @pytest.mark.parametrize(
     ("group", "path"),
-    [("target", "dqn/head/kernel"), ("optimizer", "adam/dqn_head_kernel_momentum")],
+    [
+        ("online", "dqn/head/kernel"),
+        ("target", "dqn/head/kernel"),
+        ("optimizer", "adam/dqn_head_kernel_momentum"),
+    ],
 )
 def test_set_state_refuses_other_paths_or_shapes_and_changes_nothing(
-    group: str, path: str, change: Callable[..., None]
+    group: str, path: str, change: str
 ) -> None:
-    weights, state = other_state()
-    change(state[group], path)
+    state = other_state()
+    array = state[group][path] if change == "add" else state[group].pop(path)
+    if change in ("add", "rename"):
+        state[group]["other/kernel"] = array
+    elif change != "remove":
+        state[group][path] = array.T if change == "transpose" else array[:1]
     agent = make_agent()
-    before, policy = values(agent), agent.policy
-    name = "other/kernel" if change is add else path
+    before, policy = agent.get_state(), agent.policy
+    name = "other/kernel" if change == "add" else path
     with pytest.raises(ValueError, match=f"^{group}/{name} is missing, unknown or of another"):
-        agent.set_state(weights, state)
-    assert_equal(values(agent), before)
+        agent.set_state(state)
+    assert_equal(agent.get_state(), before)
     assert agent.policy is policy
-
-
-@pytest.mark.parametrize("wrong", ["one array too few", "a shorter array"])
-def test_set_state_refuses_weights_of_other_layers_and_changes_nothing(wrong: str) -> None:
-    weights, state = other_state()
-    last = weights.pop()
-    if wrong == "a shorter array":
-        weights.append(last[:1])
-    agent = make_agent()
-    before = values(agent)
-    with pytest.raises(ValueError):
-        agent.set_state(weights, state)
-    assert_equal(values(agent), before)
 
 
 def averaging_agent() -> Agent:
@@ -351,25 +331,22 @@ def test_average_weights_sets_the_moving_average_of_the_updates() -> None:
         weights = agent.online.get_weights()
         pairs = zip(expected or weights, weights, strict=True)
         expected = [(before + now) / 2 for before, now in pairs]
-    assert any((now != mean).any() for now, mean in zip(weights, expected, strict=True))
+    assert differ(weights, expected)
     agent.average_weights()
-    for found, mean in zip(agent.online.get_weights(), expected, strict=True):
-        np.testing.assert_allclose(found, mean, atol=1e-7)
+    assert_weights(agent.online.get_weights(), expected, atol=1e-7)
     q = agent.online(OBSERVATION[np.newaxis]).numpy()[0]
     np.testing.assert_allclose(agent.policy.q_values(OBSERVATION), q, atol=1e-6)
 
 
-@pytest.mark.parametrize("make", [make_agent, averaging_agent])
-def test_average_weights_changes_nothing_before_the_first_update(make: Callable[[], Agent]) -> None:
+@pytest.mark.parametrize(
+    ("make", "updates"), [(make_agent, 0), (averaging_agent, 0), (make_agent, 2)]
+)
+def test_average_weights_changes_nothing_without_an_average(
+    make: Callable[[], Agent], updates: int
+) -> None:
     agent = make()
-    before = values(agent)
+    if updates:
+        agent.update(random_batches(updates))
+    before = agent.get_state()
     agent.average_weights()
-    assert_equal(values(agent), before)
-
-
-def test_average_weights_changes_nothing_without_an_average() -> None:
-    agent = make_agent()
-    agent.update(random_batches(2))
-    before = values(agent)
-    agent.average_weights()
-    assert_equal(values(agent), before)
+    assert_equal(agent.get_state(), before)

@@ -40,26 +40,6 @@ def test_double_target_is_the_value_of_the_action_that_the_online_network_choose
     np.testing.assert_array_equal(target, [10 + 0.5 * 1, 20, 30 + 0.5 * -2])
 
 
-def test_double_target_of_equal_networks_is_the_plain_target() -> None:
-    np.testing.assert_array_equal(
-        double_td_target(REWARD, TERMINATED, NEXT_Q, NEXT_Q, 0.9),
-        td_target(REWARD, TERMINATED, NEXT_Q, 0.9),
-    )
-
-
-def test_target_with_discount_0_is_the_reward() -> None:
-    np.testing.assert_array_equal(td_target(REWARD, NO_END, NEXT_Q, 0.0), REWARD)
-    np.testing.assert_array_equal(
-        double_td_target(REWARD, NO_END, NEXT_Q, NEXT_Q_ONLINE, 0.0), REWARD
-    )
-
-
-def test_target_with_discount_1_is_the_sum() -> None:
-    np.testing.assert_array_equal(td_target(REWARD, NO_END, NEXT_Q, 1.0), [15, 27, 29])
-    target = double_td_target(REWARD, NO_END, NEXT_Q, NEXT_Q_ONLINE, 1.0)
-    np.testing.assert_array_equal(target, [11, 21, 28])
-
-
 def test_target_after_termination_is_the_reward_whatever_the_next_values() -> None:
     ended = tf.ones(3, bool)
     for next_q in (NEXT_Q, tf.fill((3, 3), np.inf), tf.fill((3, 3), np.nan)):
@@ -69,47 +49,22 @@ def test_target_after_termination_is_the_reward_whatever_the_next_values() -> No
         )
 
 
-def test_no_gradient_flows_through_the_target() -> None:
-    inputs = [REWARD, NEXT_Q]
-    with tf.GradientTape() as tape:
+def test_no_gradient_flows_through_the_targets() -> None:
+    inputs = [REWARD, NEXT_Q, NEXT_Q_ONLINE]
+    with tf.GradientTape(persistent=True) as tape:
         tape.watch(inputs)
         target = td_target(REWARD, NO_END, NEXT_Q, 0.9)
-    assert tape.gradient(target, inputs) == [None, None]
-
-
-def test_no_gradient_flows_through_the_double_target() -> None:
-    inputs = [REWARD, NEXT_Q, NEXT_Q_ONLINE]
-    with tf.GradientTape() as tape:
-        tape.watch(inputs)
-        target = double_td_target(REWARD, NO_END, NEXT_Q, NEXT_Q_ONLINE, 0.9)
+        double_target = double_td_target(REWARD, NO_END, NEXT_Q, NEXT_Q_ONLINE, 0.9)
     assert tape.gradient(target, inputs) == [None, None, None]
+    assert tape.gradient(double_target, inputs) == [None, None, None]
 
 
 def test_mean_squared_error_is_the_squared_error_of_taken_actions_over_all_outputs() -> None:
     q = tf.constant([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    loss = mean_squared_error(q, tf.constant([2, 0]), tf.constant([5.0, 1.0]))
-    assert float(loss) == pytest.approx(((5 - 3) ** 2 + (1 - 4) ** 2) / 6)
-
-
-def test_mean_squared_error_equals_that_of_a_loop_over_all_outputs() -> None:
-    random = np.random.RandomState(0)
-    q = random.randn(32, 41).astype(np.float32)
-    action = random.randint(0, 41, 32).astype(np.int32)
-    target = random.randn(32).astype(np.float32)
-    total = 0.0
-    for row in range(32):
-        for output in range(41):
-            output_target = target[row] if output == action[row] else q[row, output]
-            total += float(output_target - q[row, output]) ** 2
-    loss = mean_squared_error(tf.constant(q), tf.constant(action), tf.constant(target))
-    np.testing.assert_allclose(loss, total / (32 * 41), rtol=1e-5)
-
-
-def test_mean_squared_error_has_a_gradient_for_taken_actions_only() -> None:
-    q = tf.constant([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    slope = gradient(mean_squared_error, q, tf.constant([1, 0]), tf.constant([5.0, 1.0]))
+    batch = (tf.constant([1, 0]), tf.constant([5.0, 1.0]))
+    assert float(mean_squared_error(q, *batch)) == pytest.approx(((5 - 2) ** 2 + (1 - 4) ** 2) / 6)
     expected = [[0, 2 * (2 - 5) / 6, 0], [2 * (4 - 1) / 6, 0, 0]]
-    np.testing.assert_allclose(slope, expected, rtol=1e-6)
+    np.testing.assert_allclose(gradient(mean_squared_error, q, *batch), expected, rtol=1e-6)
 
 
 # The TD error q - target, its Huber loss and the slope of that loss, with δ = 1.
@@ -141,3 +96,63 @@ def test_huber_is_the_mean_over_the_taken_actions() -> None:
     assert float(huber(q, *batch)) == pytest.approx((0.125 + 2.5 + 1.0) / 3)
     slope = gradient(huber, q, *batch)
     np.testing.assert_allclose(slope, [[0.5 / 3, 0], [0, 1 / 3], [0, 1 / 3]], rtol=1e-6)
+
+
+ARGUMENTS: dict[Callable[..., tf.Tensor], dict[str, tf.Tensor]] = {
+    td_target: {"reward": REWARD, "terminated": TERMINATED, "next_q": NEXT_Q},
+    double_td_target: {
+        **{"reward": REWARD, "terminated": TERMINATED},
+        **{"next_q": NEXT_Q, "next_q_online": NEXT_Q_ONLINE},
+    },
+    mean_squared_error: {"q": NEXT_Q, "action": tf.constant([1, 0, 2]), "target": REWARD},
+    huber: {"q": NEXT_Q, "action": tf.constant([1, 0, 2]), "target": REWARD},
+}
+EACH_ARGUMENT = pytest.mark.parametrize(
+    ("function", "name"),
+    [(function, name) for function, tensors in ARGUMENTS.items() for name in tensors],
+)
+
+
+def trace(function: Callable[..., tf.Tensor], **changes: tf.Tensor) -> Any:
+    """Returns the graph of a function of `ARGUMENTS`."""
+    tensors = {**ARGUMENTS[function], **changes}
+    others = {"discount": 0.9} if "reward" in tensors else {}
+    return tf.function(lambda values: function(**values, **others)).get_concrete_function(tensors)
+
+
+@EACH_ARGUMENT
+def test_tensor_of_another_shape_is_refused_when_the_function_is_traced(
+    function: Callable[..., tf.Tensor], name: str
+) -> None:
+    right = ARGUMENTS[function][name]  # [3] or [3, 3]
+    for wrong in (right[..., tf.newaxis], right[:1], right[0], right[0:0]):
+        with pytest.raises(ValueError, match=r"\w+ has shape \(.*\), expected \[B(, A)?\] = \("):
+            trace(function, **{name: wrong})
+
+
+@EACH_ARGUMENT
+def test_tensor_of_another_dtype_is_refused_when_the_function_is_traced(
+    function: Callable[..., tf.Tensor], name: str
+) -> None:
+    with pytest.raises(TypeError, match=f"{name} is float64, expected (float32|bool|int32)$"):
+        trace(function, **{name: tf.cast(ARGUMENTS[function][name], tf.float64)})
+
+
+def test_error_names_the_tensor_and_both_shapes() -> None:
+    batch = (tf.constant([1, 0, 2]), REWARD[:, tf.newaxis])
+    with pytest.raises(ValueError, match=r"^target has shape \(3, 1\), expected \[B\] = \(3,\)$"):
+        huber(NEXT_Q, *batch)
+
+
+@pytest.mark.parametrize("function", ARGUMENTS)
+def test_checks_accept_unknown_sizes_and_add_nothing_to_the_graph(
+    function: Callable[..., tf.Tensor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unknown = {
+        name: tf.TensorSpec([None, 3][: tensor.ndim], tensor.dtype)
+        for name, tensor in ARGUMENTS[function].items()
+    }
+    assert trace(function, **unknown).structured_outputs.dtype == tf.float32
+    checked = len(trace(function).graph.get_operations())
+    monkeypatch.setattr("keras_pendulum.dqn.losses._check", lambda **tensors: None)
+    assert len(trace(function).graph.get_operations()) == checked

@@ -22,16 +22,6 @@ def test_q_values_are_those_of_the_network(activation: str) -> None:
         assert policy.action(observation) == q.argmax()
 
 
-def test_q_values_are_those_computed_by_hand() -> None:
-    kernel = np.array([[1, -1], [0, 0], [0.5, 0]], np.float32)
-    head = np.array([[1, 2], [3, 4]], np.float32)
-    biases = np.array([0.25, 0], np.float32), np.array([10, 20], np.float32)
-    policy = GreedyPolicy([kernel, biases[0], head, biases[1]], "relu")
-    # Hidden features 2 - 0.5 + 0.25 = 1.75 and max(-2, 0) = 0.
-    q = policy.q_values(np.array([2, 9, -1], np.float32))
-    np.testing.assert_array_equal(q, [11.75, 23.5])
-
-
 def test_policy_leaves_observation_and_weights_as_they_are() -> None:
     network = DQN((8,), activation="relu")
     weights = network.get_weights()

@@ -6,7 +6,7 @@ Keras rounds them to float32, PyTorch computes them in float64, which changes a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,7 @@ def twin_agent(config: Config, weights: Weights) -> torch_agent.Agent:
         torch_agent.KerasAdam(online.parameters(), learning_rate),
         {"squared": torch_agent.mean_squared_error, "huber": torch_agent.huber}[config.loss],
         config.discount,
-        config.double_q,
+        torch_agent.double_q_learning if config.double_q else torch_agent.q_learning,
     )
 
 
@@ -99,43 +99,24 @@ def test_200_updates_give_the_same_losses_and_weights(
             assert largest_difference(twin_weights, network.get_weights()) < 2e-5
 
 
-def learn_recorded_batches(
-    recorded: Recorded,
-    recorded_transitions: Transitions,
-    epsilon: Callable[[int], float] = torch_agent.keras_epsilon,
-) -> tuple[NDArray[np.float32], Weights]:
-    """Makes the recorded run's updates in PyTorch; returns losses [459] and final weights."""
+def test_torch_repeats_the_updates_of_the_recorded_run(
+    recorded: Recorded, recorded_transitions: Transitions
+) -> None:
     network = torch_agent.from_keras(recorded_weights(recorded, "initial"))
     agent = torch_agent.Agent(
         network,
         network,
         torch_agent.no_update,
-        torch_agent.KerasAdam(network.parameters(), torch_agent.constant_rate(1e-3), epsilon),
+        torch_agent.KerasAdam(network.parameters(), torch_agent.constant_rate(1e-3)),
         torch_agent.mean_squared_error,
         discount=0.9,
     )
-    losses = agent.update(to_torch(take(recorded_transitions, recorded["batch"])))
-    return losses, torch_agent.to_keras(network)
-
-
-def test_torch_repeats_the_updates_of_the_recorded_run(
-    recorded: Recorded, recorded_transitions: Transitions
-) -> None:
-    losses, weights = learn_recorded_batches(recorded, recorded_transitions)
+    losses = agent.update(to_torch(take(recorded_transitions, recorded["batch"])))  # [459]
+    weights = torch_agent.to_keras(network)
     # Measured: 8.0e-6 in the losses (0.006 to 1.03), 2.4e-5 in the weights, which move by 0.2.
+    # With the ε of PyTorch's Adam they are 6.9e-4 in the first 20 losses and 0.026.
     np.testing.assert_allclose(losses, recorded["loss"], rtol=0, atol=2.5e-5)
     assert largest_difference(weights, recorded_weights(recorded, "final")) < 5e-5
-
-
-def test_torch_with_its_own_epsilon_does_not_repeat_the_recorded_run(
-    recorded: Recorded, recorded_transitions: Transitions
-) -> None:
-    losses, weights = learn_recorded_batches(
-        recorded, recorded_transitions, epsilon=lambda step: 1e-7
-    )
-    # Measured: 6.9e-4 in the first 20 losses, 0.026 in the final weights.
-    assert abs(losses - recorded["loss"])[:20].max() > 1e-4
-    assert largest_difference(weights, recorded_weights(recorded, "final")) > 1e-3
 
 
 def test_keras_weights_in_torch_give_the_same_q_values(recorded: Recorded) -> None:
@@ -147,17 +128,6 @@ def test_keras_weights_in_torch_give_the_same_q_values(recorded: Recorded) -> No
         q_values = torch_agent.from_keras(weights)(torch.from_numpy(observations)).numpy()
     np.testing.assert_allclose(q_values, network(observations), rtol=0, atol=1e-5)
     np.testing.assert_allclose(q_values, recorded["probe_q_values"], rtol=0, atol=1e-5)
-
-
-def test_torch_weights_in_keras_give_the_same_q_values(recorded: Recorded) -> None:
-    observations = recorded["probe_observations"]
-    torch.manual_seed(0)
-    twin = torch_agent.DQN((3, 512, 256, 128, 41))
-    network = DQN()
-    network.set_weights(torch_agent.to_keras(twin))
-    with torch.no_grad():
-        q_values = twin(torch.from_numpy(observations)).numpy()
-    np.testing.assert_allclose(network(observations), q_values, rtol=0, atol=1e-5)
 
 
 def test_weights_are_the_same_after_the_way_to_torch_and_back(recorded: Recorded) -> None:
@@ -192,31 +162,6 @@ def test_targets_and_losses_agree_with_torch_on_random_input() -> None:
             twin_loss = getattr(torch_agent, name)(*map(torch.from_numpy, batch))
             loss = getattr(keras_losses, name)(*batch)
             np.testing.assert_allclose(twin_loss, loss, rtol=1e-6)
-
-
-def test_target_and_loss_agree_with_numbers_computed_by_hand() -> None:
-    reward = np.array([1, -2], np.float32)
-    terminated = np.array([False, True])
-    next_q = np.array([[1, 4, 2], [5, 6, 7]], np.float32)
-    q = np.array([[0, 1, 2], [3, 4, 5]], np.float32)
-    action = np.array([1, 0], np.int32)
-    expected_target = [1 + 0.5 * 4, -2]  # the second row is terminated
-    expected_loss = ((3 - 1) ** 2 + (-2 - 3) ** 2) / 6  # over 2 rows of 3 outputs
-
-    target = keras_losses.td_target(reward, terminated, next_q, 0.5)
-    np.testing.assert_array_equal(target, expected_target)
-    loss = keras_losses.mean_squared_error(q, action, target)
-    assert float(loss) == pytest.approx(expected_loss)
-
-    outputs = torch.tensor(q, requires_grad=True)
-    twin_target = torch_agent.td_target(
-        torch.from_numpy(reward), torch.from_numpy(terminated), torch.from_numpy(next_q), 0.5
-    )
-    np.testing.assert_array_equal(twin_target, expected_target)
-    twin_loss = torch_agent.mean_squared_error(outputs, torch.from_numpy(action), twin_target)
-    assert twin_loss.item() == pytest.approx(expected_loss)
-    (gradient,) = torch.autograd.grad(twin_loss, outputs)
-    np.testing.assert_allclose(gradient, [[0, -4 / 6, 0], [10 / 6, 0, 0]], rtol=1e-6)
 
 
 def test_cosine_rate_is_that_of_the_keras_optimizer() -> None:

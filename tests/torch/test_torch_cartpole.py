@@ -8,13 +8,14 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+import torch_agent
 import torch_cartpole
 from numpy.typing import NDArray
 
-from benchmarks.recorded_cartpole import RECORD, recorded_episodes, repeated_episodes
+from benchmarks.recorded_runs.cartpole import RECORDING, recorded_episodes, repeated_episodes
+from benchmarks.recorded_runs.recording import load_recording
 from keras_pendulum.config.presets import preset
 from keras_pendulum.dqn.agent import Agent
-from keras_pendulum.dqn.losses import huber
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.dqn.random_streams import RandomStreams
 from keras_pendulum.dqn.replay_buffer import ReplayBuffer, Transitions
@@ -72,15 +73,15 @@ def learn_both(seed: int, updates: int) -> Iterator[tuple[Agent, torch_cartpole.
         yield agent, twin
 
 
-def first_batch(batches: Transitions) -> torch_cartpole.Transitions:
-    return torch_cartpole.Transitions(*(torch.from_numpy(field[0]) for field in batches))
+def first_batch(batches: Transitions) -> torch_agent.Transitions:
+    return torch_agent.Transitions(*(torch.from_numpy(field[0]) for field in batches))
 
 
 def differences(agent: Agent, twin: torch_cartpole.Agent) -> NDArray[np.float32]:
     """Returns the absolute difference of every weight, of both networks."""
     pairs = [
-        *zip(agent.online.get_weights(), torch_cartpole.to_keras(twin.online), strict=True),
-        *zip(agent.target.get_weights(), torch_cartpole.to_keras(twin.target), strict=True),
+        *zip(agent.online.get_weights(), torch_agent.to_keras(twin.online), strict=True),
+        *zip(agent.target.get_weights(), torch_agent.to_keras(twin.target), strict=True),
     ]
     return np.concatenate([abs(ours - theirs).ravel() for ours, theirs in pairs])
 
@@ -99,37 +100,24 @@ def test_rounding_at_the_corner_of_relu_changes_few_weights_and_no_value() -> No
     *_, (agent, twin) = learn_both(9, 500)
     different = differences(agent, twin) > 1e-4
     assert 0 < different.mean() < 0.01
-    observations = random_replay(9)[0].get_state()["observation"]  # [2000, 4]
+    observations = random_replay(9)[0].transitions().observation  # [2000, 4]
     with torch.no_grad():
         q_values = twin.online(torch.from_numpy(observations)).numpy()
     # Measured: 1.8e-4, of values up to 2.8.
     np.testing.assert_allclose(agent.online(observations), q_values, rtol=0, atol=1e-3)
 
 
-def test_weights_differ_with_the_epsilon_of_torch() -> None:
-    replay, streams = random_replay(3)
-    agent = make_run(preset("cartpole-original", seed=3)).agent
-    twin = torch_cartpole.Agent(agent.online.get_weights())
-    for _ in range(100):
-        batches = replay.sample(CONFIG.batch_size, streams.replay)
-        agent.update(batches)
-        twin.gradient_step(first_batch(batches))
-    assert differences(agent, twin).max() > 1e-4
-
-
 def test_recorded_run_of_torch_is_repeated_action_by_action() -> None:
-    with np.load(RECORD) as arrays:
-        recorded = dict(arrays)
+    recorded = load_recording(RECORDING)
     expected = recorded_episodes(recorded)
     repeated = repeated_episodes(recorded)
-    for episode in range(10):  # benchmarks/recorded_cartpole.py counts all equal episodes: 91
+    for episode in range(10):  # benchmarks/recorded_runs/cartpole.py counts all equal episodes: 91
         np.testing.assert_array_equal(next(repeated), expected[episode], f"episode {episode}")
     assert sum(map(len, expected[:10])) > 150  # updates begin after 128 steps
 
 
 def test_program_repeats_its_recorded_run() -> None:
-    with np.load(RECORD) as arrays:
-        recorded = dict(arrays)
+    recorded = load_recording(RECORDING)
     initial = [recorded[f"initial_weight_{i}"] for i in range(6)]
     agent = torch_cartpole.Agent(initial, torch_cartpole.keras_epsilon)
     episodes = torch_cartpole.train_episodes(agent, int(recorded["seed"]), 10)
@@ -141,19 +129,8 @@ def test_initial_weights_have_the_spread_of_torch() -> None:
     online = DQN((128, 128), 2, observation_size=4, initial_weights=CONFIG.initial_weights)
     torch.manual_seed(0)
     for ours, theirs in zip(
-        online.get_weights(), torch_cartpole.to_keras(torch_cartpole.network()), strict=True
+        online.get_weights(), torch_agent.to_keras(torch_cartpole.network()), strict=True
     ):
         assert ours.shape == theirs.shape
         assert abs(ours).max() == pytest.approx(abs(theirs).max(), rel=0.3)
         assert ours.std() == pytest.approx(theirs.std(), rel=0.5)
-
-
-def test_huber_agrees_with_torch_and_with_numbers_computed_by_hand() -> None:
-    q = np.array([[0.5, 9], [9, 3.0], [9, -2]], np.float32)
-    action = np.array([0, 1, 1], np.int32)
-    target = np.array([0, 0, -3.5], np.float32)
-    by_hand = (0.5 * 0.5**2 + (3 - 0.5) + (1.5 - 0.5)) / 3
-    assert float(huber(q, action, target)) == pytest.approx(by_hand)
-    taken = torch.tensor([0.5, 3, -2])
-    torch_loss = torch.nn.functional.smooth_l1_loss(taken, torch.from_numpy(target))
-    assert torch_loss.item() == pytest.approx(by_hand)

@@ -23,34 +23,38 @@ KERAS_EPSILON = 1e-7  # PyTorch's default is 1e-8
 class Transitions(NamedTuple):
     """Transitions of shape [B] for a batch, or [K, B] for K batches."""
 
-    observation: Tensor  # [..., 3] float32
+    observation: Tensor  # [..., D] float32
     action: Tensor  # [...] integer, index of the action
     reward: Tensor  # [...] float32
-    next_observation: Tensor  # [..., 3] float32
+    next_observation: Tensor  # [..., D] float32
     terminated: Tensor  # [...] bool
 
 
 class DQN(nn.Sequential):
-    """Linear layers with tanh between them: observations [B, 3] in, Q-values [B, A] out.
+    """Linear layers with an activation between them: observations [B, D] in, Q-values [B, A] out.
 
     Args:
         sizes: the widths from input to output, such as (3, 512, 256, 128, 41).
+        activation: makes the layer after each hidden one.
     """
 
-    def __init__(self, sizes: Sequence[int]) -> None:
+    def __init__(self, sizes: Sequence[int], activation: Callable[[], nn.Module] = nn.Tanh) -> None:
         layers: list[nn.Module] = []
         for inputs, outputs in pairwise(sizes):
-            layers += [nn.Linear(inputs, outputs), nn.Tanh()]
+            layers += [nn.Linear(inputs, outputs), activation()]
         super().__init__(*layers[:-1])  # the output is linear
 
 
-def from_keras(weights: Sequence[NDArray[np.float32]]) -> DQN:
+def from_keras(
+    weights: Sequence[NDArray[np.float32]], activation: Callable[[], nn.Module] = nn.Tanh
+) -> DQN:
     """Returns the network with the weights of Keras's `get_weights()`.
 
     Args:
         weights: kernel [in, out] and bias [out] of each layer.
+        activation: as in `DQN`.
     """
-    network = DQN([kernel.shape[0] for kernel in weights[::2]] + [len(weights[-1])])
+    network = DQN([kernel.shape[0] for kernel in weights[::2]] + [len(weights[-1])], activation)
     with torch.no_grad():
         for parameter, array in zip(network.parameters(), weights, strict=True):
             parameter.copy_(torch.tensor(array.T))  # a kernel is [out, in] in PyTorch
@@ -99,9 +103,26 @@ def huber(q: Tensor, action: Tensor, target: Tensor) -> Tensor:
     return torch.where(size < 1.0, 0.5 * error.square(), size - 0.5).mean()
 
 
+# Returns the TD targets [B] from the online network, the target network, a batch [B, ...] and γ.
+TargetRule = Callable[[nn.Module, nn.Module, Transitions, float], Tensor]
 # Called after each gradient step with the online network, the target network and the number of
 # gradient steps so far.
 TargetUpdate = Callable[[nn.Module, nn.Module, int], None]
+
+
+def q_learning(online: nn.Module, target: nn.Module, batch: Transitions, discount: float) -> Tensor:
+    """Returns the TD targets [B] with next actions that `target` chooses and values."""
+    next_q = target(batch.next_observation)  # [B, A]
+    return td_target(batch.reward, batch.terminated, next_q, discount)
+
+
+def double_q_learning(
+    online: nn.Module, target: nn.Module, batch: Transitions, discount: float
+) -> Tensor:
+    """Returns the TD targets [B] with next actions that `online` chooses and `target` values."""
+    next_q = target(batch.next_observation)  # [B, A]
+    next_q_online = online(batch.next_observation)  # [B, A]
+    return double_td_target(batch.reward, batch.terminated, next_q, next_q_online, discount)
 
 
 def soft_update(tau: float) -> TargetUpdate:
@@ -138,13 +159,13 @@ def cosine_rate(first: float, last_step: int) -> Callable[[int], float]:
     return lambda steps: first * (1 + math.cos(math.pi * min(steps / last_step, 1))) / 2
 
 
-def keras_epsilon(step: int) -> float:
+def keras_epsilon(step: int, epsilon: float = KERAS_EPSILON) -> float:
     """Returns the ε with which PyTorch's Adam makes Keras's step number `step` (from 1).
 
     Keras adds its ε to √v before the bias correction of v, PyTorch after it. So Keras's ε is
     divided by √(1 - β₂ᵗ) too: at step 1 it is 30 times larger.
     """
-    return KERAS_EPSILON / math.sqrt(1 - BETAS[1] ** step)
+    return epsilon / math.sqrt(1 - BETAS[1] ** step)
 
 
 class KerasAdam(torch.optim.Adam):
@@ -153,18 +174,15 @@ class KerasAdam(torch.optim.Adam):
     Args:
         parameters: of the online network.
         learning_rate: a schedule, called with the number of steps before.
-        epsilon: Adam's ε in PyTorch's place, called with the number of the step.
     """
 
     def __init__(
         self,
         parameters: Iterable[Tensor],
         learning_rate: Callable[[int], float],
-        epsilon: Callable[[int], float] = keras_epsilon,
     ) -> None:
         super().__init__(parameters, betas=BETAS)
         self.learning_rate = learning_rate
-        self.epsilon = epsilon
         self.iterations = 0
 
     def step(self, closure: Any = None) -> Any:
@@ -172,7 +190,7 @@ class KerasAdam(torch.optim.Adam):
         (settings,) = self.param_groups
         settings["lr"] = self.learning_rate(self.iterations)
         self.iterations += 1
-        settings["eps"] = self.epsilon(self.iterations)
+        settings["eps"] = keras_epsilon(self.iterations)
         return super().step(closure)
 
 
@@ -186,7 +204,7 @@ class Agent:
         optimizer: of the parameters of `online`.
         loss: a scalar from Q-values [B, A], actions [B] and TD targets [B].
         discount: γ.
-        double_q: true where `online` chooses the next action that `target` values.
+        target_rule: makes the TD targets.
     """
 
     def __init__(
@@ -197,7 +215,7 @@ class Agent:
         optimizer: KerasAdam,
         loss: Callable[[Tensor, Tensor, Tensor], Tensor],
         discount: float,
-        double_q: bool = False,
+        target_rule: TargetRule = q_learning,
     ) -> None:
         self.online = online
         self.target = target
@@ -205,7 +223,7 @@ class Agent:
         self.optimizer = optimizer
         self.loss = loss
         self.discount = discount
-        self.double_q = double_q
+        self.target_rule = target_rule
 
     def update(self, batches: Transitions) -> NDArray[np.float32]:
         """Makes one gradient step for each of the batches [K, B, ...]; returns the losses [K]."""
@@ -215,13 +233,7 @@ class Agent:
     def gradient_step(self, batch: Transitions) -> Tensor:
         """Makes one gradient step from a batch [B, ...]; returns its loss, a scalar."""
         with torch.no_grad():
-            next_q = self.target(batch.next_observation)  # [B, A]
-            outcome = (batch.reward, batch.terminated, next_q)
-            if self.double_q:
-                next_q_online = self.online(batch.next_observation)  # [B, A]
-                target = double_td_target(*outcome, next_q_online, self.discount)  # [B]
-            else:
-                target = td_target(*outcome, self.discount)  # [B]
+            target = self.target_rule(self.online, self.target, batch, self.discount)  # [B]
         q = self.online(batch.observation)  # [B, A]
         loss = self.loss(q, batch.action, target)
         self.optimizer.zero_grad()

@@ -3,7 +3,8 @@
     python tests/torch/torch_cartpole.py OUT.npz [SEED [EPISODES]]
 
 records a run. Of the package it uses only the random-number generators, so that both programs can
-have the same draws. test_torch_cartpole.py compares both, and benchmarks/cartpole.py times them.
+have the same draws. test_torch_cartpole.py compares both, and
+benchmarks/learning/cartpole_beside_pytorch.py times them.
 """
 
 from __future__ import annotations
@@ -12,14 +13,17 @@ import math
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from random import Random
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import numpy as np
 import torch
+import torch_agent
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
+from torch_agent import DQN, Transitions, from_keras, to_keras
 
 from keras_pendulum.dqn.random_streams import RandomStreams
 
@@ -32,25 +36,13 @@ LEARNING_RATE = 1e-4
 TAU = 0.005
 
 
-def network(weights: Sequence[NDArray[np.float32]] | None = None) -> nn.Sequential:
+def network(weights: Sequence[NDArray[np.float32]] | None = None) -> DQN:
     """Returns the network 4-128-128-2 with ReLU.
 
     Args:
         weights: as Keras's `get_weights` returns them; None for PyTorch's own initial weights.
     """
-    layers = nn.Sequential(
-        nn.Linear(4, 128), nn.ReLU(), nn.Linear(128, 128), nn.ReLU(), nn.Linear(128, 2)
-    )
-    if weights is not None:
-        with torch.no_grad():
-            for parameter, array in zip(layers.parameters(), weights, strict=True):
-                parameter.copy_(torch.tensor(array.T))  # a kernel is [out, in] in PyTorch
-    return layers
-
-
-def to_keras(layers: nn.Module) -> list[NDArray[np.float32]]:
-    """Returns copies of the weights as Keras's `set_weights` takes them."""
-    return [parameter.detach().numpy().T.copy() for parameter in layers.parameters()]
+    return DQN((4, 128, 128, 2), nn.ReLU) if weights is None else from_keras(weights, nn.ReLU)
 
 
 def torch_epsilon(step: int) -> float:
@@ -58,19 +50,8 @@ def torch_epsilon(step: int) -> float:
     return 1e-8
 
 
-def keras_epsilon(step: int) -> float:
-    """Returns the ε with which PyTorch makes Keras's step number `step`; see torch_agent.py."""
-    return 1e-8 / math.sqrt(1 - 0.999**step)
-
-
-class Transitions(NamedTuple):
-    """Transitions: one [1] in the replay buffer, many [B] in a batch."""
-
-    observation: Tensor  # [B, 4] float32
-    action: Tensor  # [B] integer
-    reward: Tensor  # [B] float32
-    next_observation: Tensor  # [B, 4] float32
-    terminated: Tensor  # [B] bool
+# The ε with which PyTorch makes Keras's steps.
+keras_epsilon = partial(torch_agent.keras_epsilon, epsilon=1e-8)
 
 
 class Agent:
