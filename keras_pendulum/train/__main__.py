@@ -8,7 +8,6 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,10 +20,12 @@ from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow, use_two_threads
 from keras_pendulum.train.closing_lines import closing_lines
-from keras_pendulum.train.progress_bar import make_progress
+from keras_pendulum.train.progress import make_progress
 
 if TYPE_CHECKING:
+    from keras_pendulum.config.config import Config
     from keras_pendulum.history import EpisodeRecord
+    from keras_pendulum.storage.run_folder import RunFolder
     from keras_pendulum.train.live_plot import LivePlot
 
 
@@ -77,22 +78,20 @@ def _train(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     if arguments.render:
         require_display()
-    live = _live_plot() if arguments.live else None
+    live = _live_plot(config) if arguments.live else None
 
     with fast_import():
         from keras_pendulum.storage.find_weights import find_weights
-        from keras_pendulum.storage.weights import load_weights
-        from keras_pendulum.train.checkpoint import load_config
-        from keras_pendulum.train.run_folder import RunFolder
+        from keras_pendulum.storage.load_weights import load_weights
+        from keras_pendulum.storage.recorded_run import load_recorded_run
+        from keras_pendulum.storage.run_folder import RunFolder
         from keras_pendulum.train.tensorboard import TensorBoardLog
         from keras_pendulum.train.train_dqn import train_dqn
 
     if arguments.resume:
         if arguments.preset:
             settings["preset"] = arguments.preset
-        resumed = RunFolder(out)
-        resumed.require_run()
-        config = replace(load_config(resumed.weights), **settings)
+        config = load_recorded_run(_run_to_resume(out).weights).config.change(**settings)
     # A run with one update in a call gains little; `original` needs one thread to repeat the
     # recorded run to its end.
     if config.train_frequency == "episode" and config.updates_per_episode > 1:
@@ -117,15 +116,11 @@ def _train(arguments: argparse.Namespace) -> int:
                 overwrite=arguments.overwrite,
                 resume=arguments.resume,
                 render=arguments.render,
-                listeners=[each for each in (new_episodes.append, progress, live, log) if each],
-                on_checkpoint=log.on_checkpoint if log else lambda network, episode: None,
-                on_phase=progress.show_phase,
+                listeners=[each for each in (new_episodes.append, log, progress, live) if each],
                 should_stop=lambda: interrupt.asked,
             )
         seconds = time.perf_counter() - started
-        if live:
-            live.finish()
-        progress.show_phase("finished" if result.finished else "interrupted")
+        progress.on_phase("finished" if result.finished else "interrupted")
     finally:
         progress.end()
     print(
@@ -141,11 +136,22 @@ def _train(arguments: argparse.Namespace) -> int:
     return 130 if interrupt.asked else 0
 
 
-def _live_plot() -> LivePlot | None:
+def _run_to_resume(out: Path) -> RunFolder:
+    from keras_pendulum.storage.run_folder import find_run
+
+    try:
+        return find_run(out)
+    except UserError as error:
+        raise UserError(
+            f"{error}; leave out --resume to start a run, or name the folder of one with --out"
+        ) from error
+
+
+def _live_plot(config: Config) -> LivePlot | None:
     from keras_pendulum.train.live_plot import LivePlot
 
     try:
-        return LivePlot()
+        return LivePlot(config)
     except UserError as error:
         print(f"no live plot: {error}; the training continues", file=sys.stderr)
         return None

@@ -5,29 +5,28 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.config.settings import RENAMED
 from keras_pendulum.dqn.agent import Variables
-from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import ConfigError, WeightsError
-from keras_pendulum.history import EpisodeRecord
+from keras_pendulum.errors import ConfigError, WeightsError, require_finite
 from keras_pendulum.storage.checksum import write_with_checksum
 from keras_pendulum.storage.keras_h5 import read_layers
-from keras_pendulum.storage.quarantine import H5File, open_h5, report_damage
-from keras_pendulum.storage.run_history import history_arrays, read_history
-from keras_pendulum.storage.weights import changed_versions, encode_weights, require_finite
+from keras_pendulum.storage.quarantine import open_h5, report_damage
+from keras_pendulum.storage.recorded_run import (
+    history_arrays,
+    read_arrays,
+    read_config,
+    read_history,
+    read_state,
+)
+from keras_pendulum.storage.save_weights import changed_versions, encode_weights
 from keras_pendulum.train.run import Run, make_run
-
-# A resumed run may change these settings; any other change makes another run.
-_MAY_CHANGE = {"episodes", "save_every", "evaluate_every", "keep_best", "snapshots"}
 
 
 def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
@@ -90,14 +89,14 @@ class CheckpointWriter:
 
 def _encode(run: Run) -> bytes:
     """Returns the content of the run's checkpoint."""
-    online, agent = run.agent.online, run.agent.get_state()
+    online, agent, replay = run.agent.online, run.agent.get_state(), run.replay.get_state()
     for variables in agent.values():
         require_finite(variables.values())
     json_state = {
         "config": vars(run.config),
         "random": run.streams.get_state(),
         "environment": run.env.unwrapped.np_random.bit_generator.state,
-        "replay_added": run.replay.added,
+        "replay_added": replay.pop("added"),
     }
     arrays: dict[str, NDArray[Any]] = {
         # JSON as an array, because an attribute can hold no more than 64 KB.
@@ -109,7 +108,7 @@ def _encode(run: Run) -> bytes:
         online.get_weights(),
         target=_dataset_names(agent["target"]),
         optimizer=_dataset_names(agent["optimizer"]),
-        replay=run.replay.get_state(),
+        replay=replay,
         run=arrays,
     )
 
@@ -119,29 +118,12 @@ def _dataset_names(variables: Variables) -> Variables:
     return {path.replace("/", "."): array for path, array in variables.items()}
 
 
-def load_config(path: str | os.PathLike[str]) -> Config:
-    """Returns the settings of the run in a checkpoint. Raises as `load_checkpoint` does."""
-    with open_h5(path) as file:
-        return _config(_read_json_state(file, path), path)
-
-
-def load_history(path: str | os.PathLike[str]) -> tuple[Config, list[EpisodeRecord]]:
-    """Returns the settings and the history of the run in a checkpoint.
-
-    Raises as `load_checkpoint` does.
-    """
-    with open_h5(path) as file:
-        config = _config(_read_json_state(file, path), path)
-        return config, read_history(file)
-
-
 def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool = False) -> Run:
     """Returns the run in a checkpoint, ready to continue.
 
     Args:
         path: the checkpoint.
-        config: the settings of the run; only `episodes`, `save_every`, `evaluate_every`,
-            `keep_best` and `snapshots` may differ.
+        config: the settings of the run; only `episodes` and those of Recording may differ.
         render: whether to show the environment in a window.
 
     Raises:
@@ -149,14 +131,14 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
         ConfigError: `config` belongs to another run.
     """
     with open_h5(path) as file:
-        state = _read_json_state(file, path)
-        stored = _config(state, path)
-        for spec in fields(Config):
-            new, old = getattr(config, spec.name), getattr(stored, spec.name)
-            if new != old and spec.name not in _MAY_CHANGE:
+        state = read_state(file, path)
+        stored = read_config(state, path)
+        for name, old in stored.learning().items():
+            new = getattr(config, name)
+            if new != old and name != "episodes":
                 raise ConfigError(
-                    f"{path}: this run has {spec.name} {old}, not {new}: resume it without this "
-                    "change, or start another run in another folder"
+                    f"{path}: this run has {name} {old}, not {new}: resume it without this change, "
+                    "or start another run in another folder"
                 )
         history = read_history(file)
         if len(history) > config.episodes:
@@ -164,13 +146,12 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
                 f"{path}: this run has {len(history)} episodes already; episodes is "
                 f"{config.episodes}, expected at least {len(history)}"
             )
-        size = TASKS[stored.environment].observation_size
-        layers = read_layers(file, os.fsdecode(path), size, None)
+        layers = read_layers(file, os.fsdecode(path), stored.task.observation_size, None)
         agent = {
-            group: {name.replace(".", "/"): array for name, array in _arrays(file, group)}
+            group: {name.replace(".", "/"): array for name, array in read_arrays(file, group)}
             for group in ("target", "optimizer")
         }
-        replay = dict(_arrays(file, "replay"))
+        replay = dict(read_arrays(file, "replay"))
         if versions := changed_versions(file):
             warnings.warn(
                 f"{os.fsdecode(path)} was saved with {', '.join(versions)}; these differ now: "
@@ -180,41 +161,13 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
     run = make_run(config, render=render)
     with report_damage(path):
         weights = [array for layer in layers for array in (layer.kernel, layer.bias)]
+        paths = [variable.path for variable in run.agent.online.weights]
         try:
-            run.agent.set_state(weights, agent)
+            run.agent.set_state({"online": dict(zip(paths, weights, strict=True)), **agent})
         except ValueError as error:
             raise WeightsError(f"{os.fsdecode(path)}: cannot be resumed, {error}") from error
-        run.replay.set_state(replay, state["replay_added"])
+        run.replay.set_state({"added": state["replay_added"], **replay})
         run.streams.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]
         run.history = history
     return run
-
-
-def _config(state: dict[str, Any], path: str | os.PathLike[str]) -> Config:
-    values = state["config"]
-    renamed = sorted(RENAMED.keys() & values.keys())
-    if renamed:
-        raise WeightsError(
-            f"{path}: this run was saved by an older version of keras_pendulum (it has the setting "
-            f"{renamed[0]}) and cannot be resumed; use --init to start a run from its weights"
-        )
-    try:
-        return Config(**{**values, "hidden_units": tuple(values["hidden_units"])})
-    except (TypeError, ConfigError) as error:
-        raise WeightsError(f"{path}: records settings that no run can have ({error})") from error
-
-
-def _read_json_state(file: H5File, path: str | os.PathLike[str]) -> dict[str, Any]:
-    if "run" not in file:
-        raise WeightsError(
-            f"{path}: holds weights without a run to resume; use --init to start a run from them"
-        )
-    state: dict[str, Any] = json.loads(file.read("run/state").tobytes())
-    return state
-
-
-def _arrays(file: H5File, group: str) -> Iterator[tuple[str, NDArray[Any]]]:
-    for name in file:
-        if name.startswith(f"{group}/"):
-            yield name.removeprefix(f"{group}/"), file.read(name)

@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING
 from keras_pendulum.cli import shell_word
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import PRESETS
-from keras_pendulum.environments.tasks import TASKS
 
 if TYPE_CHECKING:
     from keras_pendulum.evaluate.score import Score
     from keras_pendulum.history import EpisodeRecord
-    from keras_pendulum.train.run_folder import RunFolder
+    from keras_pendulum.storage.run_folder import RunFolder
     from keras_pendulum.train.train_dqn import TrainingResult
-
-# The presets that learn have 0.08 to 0.4, those of the two listings 0.005.
-_FEW_UPDATES_PER_STEP = 0.05
 
 
 def closing_lines(
@@ -39,7 +35,7 @@ def closing_lines(
         new_episodes: number of episodes in this process; 0 after a resumed run that was finished.
         score: of the final weights; None for an interrupted run.
     """
-    from keras_pendulum.evaluate.evaluation import random_return
+    from keras_pendulum.optimum.solutions import solution
 
     last = result.history[-1]
     total = f"{last.episode + 1} episodes ({last.environment_steps} steps, {last.updates} updates)"
@@ -50,10 +46,14 @@ def closing_lines(
         lines = [f"{state} {total}; this took {seconds:.1f} s."]
     lines += _evaluations(result.history)
     if score is not None:
-        steps = TASKS[score.environment].steps_per_episode
-        random = random_return(score.environment, score.gravity, steps)
+        random = solution(score.task).random_return()
         lines += [score.summary(), f"Uniformly random actions on the same starts: {random:.2f}"]
-        lines += _warnings(config, last, score.mean_return, random, folder)
+        resume = f"--resume --out {shell_word(folder.path)}"
+        if last.updates == 0:
+            lines.append(_why_untrained(config, last, resume))
+        elif score.mean_return < random:
+            how = _how_to_repair(config, folder, resume)
+            lines.append(f"The policy is worse than random actions. {how}")
     saved = ", ".join(file.name for file in folder.files if file.exists())
     lines.append(f"Saved in {folder.path}: {saved}")
     commands = _next_commands(config, result, folder, extend=not new_episodes)
@@ -76,81 +76,33 @@ def _evaluations(history: list[EpisodeRecord]) -> list[str]:
     ]
 
 
-def _warnings(
-    config: Config, last: EpisodeRecord, mean: float, random: float, folder: RunFolder
-) -> list[str]:
-    """Returns a line for a run without updates, or for a policy that is worse than random.
-
-    The line says why, and which setting to change.
-    """
-    if last.updates == 0:
-        return [f"The policy has learned nothing, because {_why_no_update(config, last, folder)}"]
-    if mean < random:
-        return [f"The policy is worse than random actions. {_why_bad(config, last, folder)}"]
-    return []
-
-
-def _why_no_update(config: Config, last: EpisodeRecord, folder: RunFolder) -> str:
+def _why_untrained(config: Config, last: EpisodeRecord, resume: str) -> str:
+    """Returns a line for a run without updates."""
     episodes, warmup = last.episode + 1, config.warmup_episodes
-    needed = max(_more_episodes(config), 2 * warmup)
-    longer = f"Continue it with {_resume_words(folder)} --episodes {needed}"
     if config.train_frequency == "episode" and episodes <= warmup:
-        return (
-            f"the run made no update: the first one comes after {warmup + 1} episodes, and the run "
-            f"has {episodes}. {longer}, or start another one with a smaller --warmup-episodes "
-            f"(now {warmup})"
-        )
+        reason = f"the first one comes after {warmup + 1} episodes, and the run has {episodes}"
+        setting = f"--warmup-episodes (now {warmup})"
+    else:
+        reason = f"its {last.environment_steps} transitions are fewer than one batch"
+        setting = f"--batch-size (now {config.batch_size})"
     return (
-        f"the run made no update: its {last.environment_steps} transitions are fewer than one "
-        f"batch. {longer}, or start another one with a smaller --batch-size (now "
-        f"{config.batch_size})"
+        f"The policy has learned nothing, because the run made no update: {reason}. Continue it "
+        f"with {resume} --episodes {max(_more_episodes(config), 2 * warmup)}, or start another one "
+        f"with a smaller {setting}"
     )
 
 
-def _resume_words(folder: RunFolder) -> str:
-    return f"--resume --out {shell_word(folder.path)}"
-
-
-def _usual_episodes(config: Config) -> int:
-    """Returns the number of episodes of the run's preset; 0 for an unknown preset."""
-    return PRESETS[config.preset].episodes if config.preset in PRESETS else 0
+def _how_to_repair(config: Config, folder: RunFolder, resume: str) -> str:
+    """Returns what to do about a policy that is worse than random actions."""
+    if config.task.has_exact_values:
+        return f"See why with python -m keras_pendulum.diagnose {shell_word(folder.path)}"
+    return f"Continue the run with {resume} --episodes {_more_episodes(config)}"
 
 
 def _more_episodes(config: Config) -> int:
     """Returns the number of episodes of the preset, for a run as long as that twice as many."""
-    usual = _usual_episodes(config)
+    usual = PRESETS[config.preset].episodes if config.preset in PRESETS else 0
     return usual if usual > config.episodes else 2 * config.episodes
-
-
-def _why_bad(config: Config, last: EpisodeRecord, folder: RunFolder) -> str:
-    usual = _usual_episodes(config)
-    if config.stored_index == "truncated":
-        return (
-            "With truncated indices, the values of two torques are never learned: try "
-            "--stored-index exact"
-        )
-    updates_per_step = config.updates_per_episode / config.max_episode_steps
-    if config.train_frequency == "episode" and updates_per_step < _FEW_UPDATES_PER_STEP:
-        return (
-            f"It had {last.updates} updates in {last.environment_steps} steps, which is little: "
-            f"try a larger --updates-per-episode (now {config.updates_per_episode}; reference has "
-            f"{Config.updates_per_episode})"
-        )
-    if last.episode + 1 < usual:
-        return (
-            f"It had {last.episode + 1} episodes; the preset {config.preset} has {usual}: "
-            f"continue with {_resume_words(folder)} --episodes {usual}"
-        )
-    constant_rate = config.learning_rate_schedule == "constant" and config.average_updates == 1
-    if constant_rate and config.train_frequency == "episode":
-        return (
-            "With a constant learning rate, the policy of the last episode may be a bad one: try "
-            "--learning-rate-schedule cosine"
-        )
-    return (
-        f"Learning may have diverged: try a smaller --learning-rate (now {config.learning_rate:g}) "
-        "or another --seed"
-    )
 
 
 def _next_commands(
@@ -158,7 +110,7 @@ def _next_commands(
 ) -> dict[str, str]:
     """Returns the words of commands that can follow, by what they do."""
     weights = shell_word(folder.path / folder.weights.name)
-    resume = f"train {_resume_words(folder)}"
+    resume = f"train --resume --out {shell_word(folder.path)}"
     if not result.finished:
         return {"Continue": resume}
     commands = {"Extend it": f"{resume} --episodes {_more_episodes(config)}"} if extend else {}
@@ -166,7 +118,7 @@ def _next_commands(
         best = shell_word(folder.path / folder.best.name)
         commands["Evaluate the best weights"] = f"evaluate {best}"
     commands["Watch it"] = f"evaluate {weights} --episodes 3 --render"
-    if TASKS[config.environment].has_torque:
+    if config.task.has_exact_values:
         commands["Play against it"] = f"play --against {weights}"
         shown = shell_word(folder.path) if folder.snapshots.exists() else weights
         commands["Take it to a browser"] = f"page {shown}"

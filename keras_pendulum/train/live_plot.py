@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.display import require_display
+from keras_pendulum.train.listeners import Listener
 
 if TYPE_CHECKING:
     from keras_pendulum.config.config import Config
@@ -15,23 +16,14 @@ if TYPE_CHECKING:
 _SECONDS_BETWEEN = 0.5  # between two drawings, which delay the training
 
 
-class _Canvas(Protocol):
-    def show(self, png: bytes) -> None:
-        """Replaces the picture."""
-
-    def closed(self) -> bool:
-        """Returns whether the user has closed the window."""
-
-
-class LivePlot:
-    """A listener for `train_dqn` that draws the learning curve of `rewards.png`, and ε.
+class LivePlot(Listener):
+    """A listener that draws the learning curve of `rewards.png`, and ε.
 
     In a notebook it draws into the cell's output, else in a window. The run continues when the user
     closes the window. Create the plot before TensorFlow is imported.
 
     Args:
-        config: the settings of the run. With None, and for `cartpole-original`, the plot shows what
-            the plot of the notebooks shows: the durations and their mean over 100 episodes.
+        config: the settings of the run.
 
     Attributes:
         config: the same; it may be set until the first episode.
@@ -39,20 +31,20 @@ class LivePlot:
     Raises UserError when there is neither a notebook nor a display.
     """
 
-    def __init__(self, config: Config | None = None) -> None:
+    def __init__(self, config: Config) -> None:
         self.config = config
         self._history: list[EpisodeRecord] = []
         self._levels: dict[str, float] | None = None  # known from the first drawing on
-        self._canvas: _Canvas = _NotebookOutput() if _in_notebook() else _Window()
+        self._canvas = _NotebookOutput() if _in_notebook() else _Window()
         self._drawn = 0.0
 
-    def __call__(self, record: EpisodeRecord) -> None:
+    def on_episode(self, record: EpisodeRecord) -> None:
         """Adds an episode."""
         self._history.append(record)
         if not self._canvas.closed() and time.monotonic() >= self._drawn + _SECONDS_BETWEEN:
             self._draw()
 
-    def finish(self) -> None:
+    def on_end(self) -> None:
         """Draws the episodes since the last drawing."""
         if self._history and not self._canvas.closed():
             self._draw()
@@ -62,17 +54,13 @@ class LivePlot:
         self._drawn = time.monotonic()
 
     def _picture(self) -> bytes:
-        from keras_pendulum.train import live_figure
+        from keras_pendulum.figures.run_figure import draw_live
         from keras_pendulum.train.reference_returns import reference_returns, run_title
 
-        title = "" if self.config is None else run_title(self.config)
-        if self.config is None or self.config.preset == "cartpole-original":
-            returns = [record.episode_return for record in self._history]
-            return live_figure.draw_durations(returns, title)
         if self._levels is None:
             self._levels = reference_returns(self.config)
-        environment = self.config.environment
-        return live_figure.draw_live(self._history, environment, self._levels, title)
+        title = run_title(self.config)
+        return draw_live(self._history, self.config.task, self._levels, title)
 
 
 class _NotebookOutput:
@@ -80,6 +68,7 @@ class _NotebookOutput:
         self._handle: Any = None
 
     def show(self, png: bytes) -> None:
+        """Replaces the picture."""
         from IPython.display import Image, display
 
         if self._handle is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -13,23 +13,27 @@ from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.train.run import Run
 
 
-def train_episodes(run: Run) -> Iterator[EpisodeRecord]:
+def train_episodes(
+    run: Run, evaluate: Callable[[Run, int], float] = lambda run, episode: math.nan
+) -> Iterator[EpisodeRecord]:
     """Trains from the next episode of the run to its last, and yields each episode's record.
 
-    With the last record, the online weights are the average of `average_updates`.
+    After the last episode, the moving average replaces the online weights.
+
+    Args:
+        run: the run.
+        evaluate: returns the greedy regret after an episode, NaN where it is not evaluated.
 
     Raises UserError, with episode and step, when an observation, a reward or a loss is not finite.
     """
     for episode in range(len(run.history), run.config.episodes):
-        record = _train_episode(run, episode)
-        if episode + 1 == run.config.episodes:
-            run.agent.average_weights()
+        record = _train_episode(run, episode, evaluate)
         run.history.append(record)
         yield record
 
 
-def _train_episode(run: Run, episode: int) -> EpisodeRecord:
-    """Plays one episode and makes its updates."""
+def _train_episode(run: Run, episode: int, evaluate: Callable[[Run, int], float]) -> EpisodeRecord:
+    """Plays one episode, makes its updates, and evaluates."""
     config, env, actions, agent, replay = run.config, run.env, run.actions, run.agent, run.replay
     started = time.perf_counter()
     # Only episode 0 seeds the environment, as in the recorded run.
@@ -63,6 +67,9 @@ def _train_episode(run: Run, episode: int) -> EpisodeRecord:
             losses += _update(run, 1, episode, step)
     if config.train_frequency == "episode" and episode >= config.warmup_episodes:
         losses += _update(run, config.updates_per_episode, episode, step)
+    seconds = time.perf_counter() - started
+    if episode + 1 == config.episodes:
+        agent.average_weights()
     return EpisodeRecord(
         episode=episode,
         average_reward=episode_return / step,
@@ -71,7 +78,8 @@ def _train_episode(run: Run, episode: int) -> EpisodeRecord:
         loss=float(np.mean(losses)) if losses else math.nan,
         environment_steps=replay.added,
         updates=(run.history[-1].updates if run.history else 0) + len(losses),
-        seconds=time.perf_counter() - started,
+        seconds=seconds,
+        greedy_regret=evaluate(run, episode),
     )
 
 
@@ -84,6 +92,8 @@ def _update(run: Run, updates: int, episode: int, step: int) -> list[float]:
     if len(replay) < config.batch_size:
         return []
     batches = replay.sample(config.batch_size, run.streams.replay, updates)  # [K, B, ...]
+    if not run.agent.is_compiled(batches):
+        run.announce("compiling")
     losses: list[float] = run.agent.update(batches).tolist()
     for loss in losses:
         if not math.isfinite(loss):

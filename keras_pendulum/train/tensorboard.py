@@ -5,11 +5,13 @@ from __future__ import annotations
 import importlib.util
 import math
 import os
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.fields import format_value
 from keras_pendulum.errors import UserError
+from keras_pendulum.train.listeners import Listener
 
 if TYPE_CHECKING:
     from keras_pendulum.dqn.network import DQN
@@ -18,14 +20,14 @@ if TYPE_CHECKING:
 _EPISODES_BETWEEN_PLANES = 50  # drawing the phase planes takes half a second
 
 
-class TensorBoardLog:
-    """A listener for `train_dqn` that writes event files.
+class TensorBoardLog(Listener):
+    """A listener that writes event files.
 
     Args:
         folder: folder for the event files; it is created after the first episode.
         config: the settings of the run.
 
-    Raises UserError when the package tensorboard is not installed, or when the folder's name is no
+    Raises UserError when the package tensorboard is not installed, or when the folder's name is not
     text.
     """
 
@@ -37,13 +39,12 @@ class TensorBoardLog:
             self._folder.encode()
         except UnicodeEncodeError as error:  # TensorFlow takes no other names
             raise UserError(
-                f"TensorBoard cannot write in {folder}, a name that is no UTF-8: name another "
+                f"TensorBoard cannot write in {folder}, a name that is not UTF-8: name another "
                 "folder with --out, or leave out --tensorboard"
             ) from error
         self._config = config
-        self._writer_or_none: Any = None
 
-    def __call__(self, record: EpisodeRecord) -> None:
+    def on_episode(self, record: EpisodeRecord) -> None:
         """Writes the figures of an episode."""
         import tensorflow as tf
 
@@ -57,7 +58,7 @@ class TensorBoardLog:
             "eval/greedy_regret": record.greedy_regret,
             "time/seconds": record.seconds,
         }
-        with self._writer().as_default(step=record.episode):
+        with self._writer.as_default(step=record.episode):
             for name, value in values.items():
                 if not math.isnan(value):
                     tf.summary.scalar(name, value)
@@ -66,28 +67,32 @@ class TensorBoardLog:
         """Writes the phase planes of a pendulum's network, every 50 episodes and at the end."""
         import tensorflow as tf
 
+        from keras_pendulum.figures.run_figure import draw_phase_planes
         from keras_pendulum.optimum.phase_plane import run_phase_planes
-        from keras_pendulum.train import run_figure
 
         is_last = episode == self._config.episodes - 1
         if is_last or episode % _EPISODES_BETWEEN_PLANES == 0:
             planes = run_phase_planes(network, self._config)
             if planes:
-                picture = tf.io.decode_png(run_figure.draw_phase_planes(planes))
-                with self._writer().as_default(step=episode):
+                picture = tf.io.decode_png(draw_phase_planes(planes))
+                with self._writer.as_default(step=episode):
                     tf.summary.image("phase plane", picture[tf.newaxis])
-        self._writer().flush()
+        self._writer.flush()
 
+    def on_end(self) -> None:
+        """Closes the file."""
+        if "_writer" in vars(self):  # there was an episode
+            self._writer.close()
+
+    @cached_property
     def _writer(self) -> Any:
         import tensorflow as tf
+        from tensorboard.plugins.hparams import api
 
-        if self._writer_or_none is None:
-            from tensorboard.plugins.hparams import api
-
-            self._writer_or_none = tf.summary.create_file_writer(self._folder)
-            with self._writer_or_none.as_default(step=0):
-                api.hparams(_hparams(self._config))
-        return self._writer_or_none
+        writer = tf.summary.create_file_writer(self._folder)
+        with writer.as_default(step=0):
+            api.hparams(_hparams(self._config))
+        return writer
 
 
 def _hparams(config: Config) -> dict[str, bool | float | str]:

@@ -19,7 +19,6 @@ from keras_pendulum.environments.actions import (
     Actions,
     TorqueGrid,
     TruncatingTorqueGrid,
-    make_actions,
     truncated_index,
 )
 from keras_pendulum.train.loop import train_episodes
@@ -30,7 +29,7 @@ Floats = NDArray[np.float64]
 
 def actions_of(preset: str) -> Actions:
     config = kp.preset(preset)
-    return make_actions(config.environment, config.torque_count, config.stored_index)
+    return make_run(config).actions
 
 
 def wrong_indices(stored: list[int]) -> dict[int, int]:
@@ -67,7 +66,7 @@ def test_index_truncation_changes_the_replay_buffer_of_the_walkthrough_only() ->
     for name in ("walkthrough", "reference"):
         run = make_run(kp.preset(name, episodes=10, epsilon_start=1, epsilon_decay=1))
         list(train_episodes(run))
-        stored[name] = set(run.replay.get_state()["action"])
+        stored[name] = set(run.replay.transitions().action)
     assert stored["walkthrough"] == set(range(41)) - {2, 4}
     assert stored["reference"] == set(range(41))
 

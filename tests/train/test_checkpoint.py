@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -18,10 +19,10 @@ from conftest import assert_same
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.settings import RENAMED
+from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.train.checkpoint import (
     CheckpointWriter,
     load_checkpoint,
-    load_config,
     save_checkpoint,
 )
 from keras_pendulum.train.loop import train_episodes
@@ -89,7 +90,7 @@ def test_run_killed_in_its_first_episode_replaces_the_old_run_and_can_be_resumed
         with pytest.raises(KilledError):
             kp.train_dqn(config, tmp_path, overwrite=True)
     assert not (tmp_path / "rewards.png").exists()  # the picture of the old run
-    assert load_config(tmp_path / "pendulum_weight.h5") == config
+    assert load_recorded_run(tmp_path / "pendulum_weight.h5").config == config
     assert_same(kp.train_dqn(config, tmp_path, resume=True), kp.train_dqn(config))
 
 
@@ -166,21 +167,50 @@ OTHER_VALUES: dict[str, Any] = {
 
 
 CHANGEABLE = ("episodes", "save_every", "evaluate_every", "keep_best", "snapshots")
+# The settings without which another one of a run has no effect.
+NEEDED = {
+    "epsilon_decay_steps": {"epsilon_schedule": "steps"},
+    "weight_decay": {"optimizer": "adamw"},
+    "learning_rate_min": {"learning_rate_schedule": "cosine"},
+    "double_q": {"target_update": "soft"},
+    "tau": {"target_update": "soft"},
+    "target_period": {"target_update": "hard"},
+}
+
+
+def replace_settings(checkpoint: Path, **changes: Any) -> None:
+    """Changes the settings that a checkpoint records."""
+    with h5py.File(checkpoint, "r+") as file:
+        state = json.loads(file["run/state"][()].tobytes())
+        state["config"] |= changes
+        replace_entry(file, "run/state", np.frombuffer(json.dumps(state).encode(), np.uint8))
 
 
 @pytest.mark.parametrize(
     "name", [spec.name for spec in fields(Config) if spec.name not in CHANGEABLE]
 )
 def test_resuming_with_another_setting_raises_and_names_it(
-    name: str, run_of_one_episode: tuple[Config, Path]
+    name: str, run_of_one_episode: tuple[Config, Path], tmp_path: Path
 ) -> None:
     config, folder = run_of_one_episode
-    changes = {name: OTHER_VALUES[name]}
-    if name == "environment":
-        changes["gravity"] = None  # CartPole has none
+    checkpoint = Path(shutil.copy(folder / "pendulum_weight.h5", tmp_path))
+    needed = NEEDED.get(name, {})
+    replace_settings(checkpoint, **needed)
+    config = config.change(**needed)
     message = f"this run has {name} {getattr(config, name)}, not {OTHER_VALUES[name]}: "
     with pytest.raises(kp.ConfigError, match=re.escape(message)):
-        load_checkpoint(folder / "pendulum_weight.h5", replace(config, **changes))
+        load_checkpoint(checkpoint, config.change(**{name: OTHER_VALUES[name]}))
+
+
+def test_run_of_an_older_version_with_a_setting_that_has_no_effect_is_resumed(
+    run_of_one_episode: tuple[Config, Path], tmp_path: Path
+) -> None:
+    config, folder = run_of_one_episode
+    old = Path(shutil.copytree(folder, tmp_path / "old"))
+    replace_settings(old / "pendulum_weight.h5", tau=0.5, target_period=7, keep_best=True)
+    assert load_recorded_run(old / "pendulum_weight.h5").config == config
+    longer = config.change(episodes=2)
+    assert_same(kp.train_dqn(longer, old, resume=True), kp.train_dqn(longer))
 
 
 def test_resumed_run_can_be_saved_and_evaluated_at_other_episodes(
@@ -301,7 +331,7 @@ def test_checkpoint_of_an_older_version_is_refused_and_its_weights_load(
         replace_entry(file, "run/state", np.frombuffer(json.dumps(state).encode(), np.uint8))
     message = rf"older version .*the setting {old_name}\) and cannot be resumed; use --init"
     with pytest.raises(kp.WeightsError, match=message):
-        load_config(checkpoint)
+        load_recorded_run(checkpoint)
     with pytest.raises(kp.WeightsError, match=message):
         kp.train_dqn(config, tmp_path / "old", resume=True)
     loaded = kp.load_weights(checkpoint)
@@ -368,7 +398,7 @@ def test_checkpoint_holds_the_evaluations(tmp_path: Path) -> None:
 def test_checkpoint_records_the_settings(tmp_path: Path) -> None:
     config = kp.preset("walkthrough", gravity=2.5, seed=9)
     save_checkpoint(make_run(config), tmp_path / "a.h5")
-    assert load_config(tmp_path / "a.h5") == config
+    assert load_recorded_run(tmp_path / "a.h5").config == config
 
 
 def test_checkpoint_written_during_the_run_holds_the_state_at_save(tmp_path: Path) -> None:
@@ -409,7 +439,7 @@ def test_error_of_the_environment_is_not_reported_as_damage(
     def no_window(*settings: object) -> None:
         raise RuntimeError("no window")
 
-    monkeypatch.setattr("keras_pendulum.train.run.make_environment", no_window)
+    monkeypatch.setattr("keras_pendulum.environments.task.Task.make_env", no_window)
     with pytest.raises(RuntimeError, match=r"^no window$"):
         load_checkpoint(tmp_path / "pendulum_weight.h5", config)
 

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from conftest import command_line
 
-from keras_pendulum.train.checkpoint import load_checkpoint, load_config
+from keras_pendulum.storage.recorded_run import load_recorded_run
+from keras_pendulum.train.checkpoint import load_checkpoint
 
 if sys.platform == "win32":
     pytest.skip("one process cannot send SIGINT to another", allow_module_level=True)
@@ -34,7 +35,7 @@ def test_control_c_saves_a_checkpoint_and_exits_130(tmp_path: Path) -> None:
                 process.send_signal(signal.SIGINT)
     assert process.returncode == 130
     assert lines[-1].startswith("Continue: python -m keras_pendulum.train --resume")
-    config = load_config(tmp_path / "run" / "pendulum_weight.h5")
+    config = load_recorded_run(tmp_path / "run" / "pendulum_weight.h5").config
     saved = load_checkpoint(tmp_path / "run" / "pendulum_weight.h5", config)
     printed = [line for line in lines if line.startswith("Episode: ")]
     assert [record.line() + "\n" for record in saved.history] == printed

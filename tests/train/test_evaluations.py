@@ -15,13 +15,14 @@ from conftest import Command, assert_same
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.optimum.optimal_return import USUAL_SEEDS
+from keras_pendulum.optimum.solution import USUAL_SEEDS
+from keras_pendulum.storage.run_folder import RunFolder, find_run
 from keras_pendulum.train import evaluations
 from keras_pendulum.train.checkpoint import load_checkpoint
-from keras_pendulum.train.evaluations import BestWeights
+from keras_pendulum.train.folder_files import BestWeightsFile
 from keras_pendulum.train.run import Run
-from keras_pendulum.train.run_folder import RunFolder
 
 SMALL: dict[str, Any] = {"hidden_units": (8,), "warmup_episodes": 2}
 FEW_STARTS = range(900, 903)
@@ -32,8 +33,8 @@ def short_runs() -> Iterator[None]:
     """Evaluates on few starts and draws nothing."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(evaluations, "SEEDS", FEW_STARTS)
-        patched.setattr("keras_pendulum.train.train_dqn.run_phase_planes", lambda *run: {})
-        patched.setattr("keras_pendulum.train.run_figure.draw_run", lambda *run: b"a picture")
+        patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
+        patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
         yield
 
 
@@ -47,7 +48,7 @@ def regrets(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[list[Any]]]:
 
         def evaluate(network: kp.DQN, episodes: int, seed: int) -> kp.Score:
             weights.append(network.get_weights())
-            return kp.Score("Pendulum-v1", 1.0, np.array([-next(remaining)]), np.zeros(1))
+            return kp.Score(Pendulum(), np.array([-next(remaining)]), np.zeros(1))
 
         monkeypatch.setattr(evaluations, "evaluate_policy", evaluate)
         return weights
@@ -81,12 +82,14 @@ def test_starts_are_not_those_of_the_results_and_their_optimum_is_never_computed
 def test_evaluated_run_equals_a_run_without_evaluations_bit_for_bit(
     name: str, tmp_path: Path
 ) -> None:
-    plain = kp.preset(name, episodes=8, **SMALL)
+    plain = kp.preset(name, episodes=8, hidden_units=(8,))
+    if plain.train_frequency == "episode":
+        plain = plain.change(**SMALL)
     config = replace(plain, evaluate_every=3, keep_best=True)
     runs: list[Run] = []
     for settings, folder in ((plain, tmp_path / "plain"), (config, tmp_path / "evaluated")):
         kp.train_dqn(settings, folder)
-        runs.append(load_checkpoint(RunFolder(folder).weights, settings))
+        runs.append(load_checkpoint(find_run(folder).weights, settings))
     without, with_evaluations = runs
     assert list(evaluated(with_evaluations.history)) == [2, 5]
     np.testing.assert_array_equal(
@@ -153,7 +156,7 @@ def test_best_weights_are_kept_beside_the_last(
     assert_weights(best, weights[3])  # the later of two equals
     assert_weights(tmp_path / "pendulum_weight.h5", result.network.get_weights())
     assert any((one != two).any() for one, two in zip(weights[3], weights[4], strict=True))
-    assert kp.load_weights(best).provenance == result.network.provenance
+    assert kp.load_weights(best).metadata == result.network.metadata
     with pytest.raises(kp.WeightsError, match="weights without a run"):
         load_checkpoint(best, config)
 
@@ -192,13 +195,13 @@ def killed_in(function: Callable[..., Any], call: int) -> Callable[..., Any]:
 def kill(place: str, patched: pytest.MonkeyPatch) -> None:
     """Makes the next run end after some of its evaluations."""
     if place == "in an evaluation":
-        due = killed_in(evaluations.evaluate_if_due, 8)
-        patched.setattr("keras_pendulum.train.train_dqn.evaluate_if_due", due)
+        due = killed_in(evaluations.greedy_regret, 8)
+        patched.setattr("keras_pendulum.train.train_dqn.greedy_regret", due)
     elif place == "between two episodes":
         patched.setattr(RunFolder, "append", killed_in(RunFolder.append, 10))
     else:
-        write = killed_in(BestWeights.write, 2)
-        patched.setattr(BestWeights, "write", lambda *arguments: write(*arguments))
+        write = killed_in(BestWeightsFile._write, 2)
+        patched.setattr(BestWeightsFile, "_write", lambda *arguments: write(*arguments))
 
 
 @pytest.fixture(scope="module")

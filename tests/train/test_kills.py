@@ -18,11 +18,11 @@ from conftest import command_line
 
 import keras_pendulum as kp
 from keras_pendulum.config.presets import PRESETS
+from keras_pendulum.storage.run_folder import find_run
 from keras_pendulum.train.checkpoint import load_checkpoint
-from keras_pendulum.train.evaluations import evaluate_if_due
+from keras_pendulum.train.evaluations import greedy_regret
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import make_run
-from keras_pendulum.train.run_folder import RunFolder
 
 SIZES = {"episodes": 56, "hidden_units": (16, 8)}  # updates begin after episode 41
 # Runs that are evaluated too, and keep their best weights.
@@ -66,11 +66,10 @@ def resumed_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_killed_and_resumed_run_equals_an_uninterrupted_run(name: str, resumed_runs: Path) -> None:
-    config, folder = config_of(name), RunFolder(resumed_runs / name)
+    config, folder = config_of(name), find_run(resumed_runs / name)
     resumed, uninterrupted = load_checkpoint(folder.weights, config), make_run(config)
     regret, best = math.inf, None
-    for _ in train_episodes(uninterrupted):
-        record = evaluate_if_due(uninterrupted, lambda: None)
+    for record in train_episodes(uninterrupted, greedy_regret):
         if record.greedy_regret <= regret:
             regret, best = record.greedy_regret, uninterrupted.agent.online.get_weights()
     np.testing.assert_array_equal(

@@ -23,7 +23,7 @@ def record(episode: int) -> EpisodeRecord:
 def window(monkeypatch: pytest.MonkeyPatch) -> live_plot.LivePlot:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setattr(live_plot, "_SECONDS_BETWEEN", 0.0)
-    return live_plot.LivePlot()
+    return live_plot.LivePlot(kp.preset("original"))
 
 
 def window_pixels() -> np.ndarray:
@@ -32,66 +32,56 @@ def window_pixels() -> np.ndarray:
 
 
 def test_window_shows_the_curve_and_each_new_episode(window: live_plot.LivePlot) -> None:
-    window(record(0))
-    window(record(1))
+    window.on_episode(record(0))
+    window.on_episode(record(1))
     before = window_pixels()
     assert before.shape == (960, 540, 3)
     assert len(np.unique(before.reshape(-1, 3), axis=0)) > 10  # not an empty window
-    window(record(2))
+    window.on_episode(record(2))
     assert (window_pixels() != before).any()
     pygame.display.quit()
 
 
 @pytest.mark.parametrize(
-    ("preset", "panels", "quantity", "lines"),
-    [
-        ("reference", 2, "Reward per step", 5),
-        ("cartpole", 2, "Return (steps)", 4),
-        ("cartpole-original", 1, "Duration (steps)", 2),
-    ],
+    ("preset", "quantity"), [("reference", "Reward per step"), ("cartpole", "Return (steps)")]
 )
 def test_plot_shows_the_learning_curve_of_the_run(
-    preset: str,
-    panels: int,
-    quantity: str,
-    lines: int,
-    window: live_plot.LivePlot,
-    monkeypatch: pytest.MonkeyPatch,
+    preset: str, quantity: str, window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window.config = kp.preset(preset, seed=7)
     monkeypatch.setattr(window, "_drawn", math.inf)  # the window draws nothing
     for episode in range(120):
-        window(record(episode))
+        window.on_episode(record(episode))
         if episode in (0, 2, 119):
             figure = figure_of(window._picture)
             require_legible(figure)
-            assert len(figure.axes) == panels
             assert figure.texts[0].get_text() == f"{preset}, seed 7"
-            curve = figure.axes[0]
-            assert (curve.get_ylabel(), len(curve.get_lines())) == (quantity, lines)
+            curve, epsilon = figure.axes
+            assert (curve.get_ylabel(), len(curve.get_lines())) == (quantity, 5)
+            assert epsilon.get_ylabel() == "Random actions (ε)"
             assert len(np.asarray(curve.get_lines()[1].get_ydata())) == episode + 1
 
 
-def test_finish_draws_episodes_since_the_last_drawing(
+def test_end_draws_episodes_since_the_last_drawing(
     window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    window(record(0))
+    window.on_episode(record(0))
     before = window_pixels()
     monkeypatch.setattr(live_plot, "_SECONDS_BETWEEN", 1e9)
-    window(record(1))
+    window.on_episode(record(1))
     assert (window_pixels() == before).all()
-    window.finish()
+    window.on_end()
     assert (window_pixels() != before).any()
     pygame.display.quit()
 
 
 def test_closed_window_is_not_opened_again(window: live_plot.LivePlot) -> None:
-    window(record(0))
+    window.on_episode(record(0))
     pygame.event.post(pygame.event.Event(pygame.QUIT))
-    window(record(1))
+    window.on_episode(record(1))
     assert not pygame.display.get_init()
-    window(record(2))
-    window.finish()
+    window.on_episode(record(2))
+    window.on_end()
     assert not pygame.display.get_init()
 
 
@@ -99,7 +89,7 @@ def test_live_plot_without_a_display_is_refused(monkeypatch: pytest.MonkeyPatch)
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
     with pytest.raises(UserError, match="no display"):
-        live_plot.LivePlot()
+        live_plot.LivePlot(kp.preset("original"))
 
 
 def test_train_live_without_a_display_prints_one_line_and_trains(command: Command) -> None:

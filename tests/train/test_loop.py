@@ -36,7 +36,7 @@ def updates(run: Run) -> list[int]:
 
 def stored(run: Run) -> Transitions:
     """Returns the transitions in the replay buffer, oldest first."""
-    return Transitions(**run.replay.get_state())
+    return run.replay.transitions()
 
 
 @dataclass
@@ -104,8 +104,7 @@ def test_train_frequency_episode_updates_after_each_episode_from_the_warmup_on()
 
 def test_train_frequency_step_updates_after_each_step_from_the_first_full_batch() -> None:
     # warmup_episodes and updates_per_episode belong to train_frequency episode.
-    settings = {"episodes": 3, "train_frequency": "step", "batch_size": 3, "warmup_episodes": 0}
-    run = ScriptedRun(".t.t.t", {**settings, "updates_per_episode": 7})
+    run = ScriptedRun(".t.t.t", {"episodes": 3, "train_frequency": "step", "batch_size": 3})
     records = run.train()
     assert run.batch_shapes == [(1, 3)] * 4
     assert [record.updates for record in records] == [0, 2, 4]

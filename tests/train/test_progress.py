@@ -1,75 +1,282 @@
-"""The progress of a run as lines, where the output is no terminal."""
+"""The progress of a run: its lines, its bar, and the terminals that the bar fits."""
 
 from __future__ import annotations
 
+import io
+import re
+import sys
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.train.progress import ProgressLines
+from keras_pendulum.train.progress import Progress, make_progress
+
+STEPS = 50  # per episode, in 0.5 s
 
 
 def record(episode: int, **changes: Any) -> EpisodeRecord:
-    value = -float(episode)
-    return EpisodeRecord(
-        episode, value / 200, value, 0.5, 0.1, 200 * (episode + 1), 0, 0.5
-    )._replace(**changes)
+    episode_return = -float((episode + 1) ** 2)
+    steps = STEPS * (episode + 1)
+    one = EpisodeRecord(
+        episode, episode_return / STEPS, episode_return, 0.5, 0.1, steps, episode, 0.5
+    )
+    return one._replace(**changes)
 
 
-def printed(
-    episodes: range, optimum: float, monkeypatch: pytest.MonkeyPatch, capsys: Any
-) -> list[str]:
+class Terminal(io.TextIOWrapper):
+    def isatty(self) -> bool:
+        return True
+
+    def lines(self) -> list[str]:
+        """Returns each line that was drawn, without the spaces at its end."""
+        self.flush()
+        assert isinstance(self.buffer, io.BytesIO)
+        text = self.buffer.getvalue().decode(self.encoding)
+        return [line.rstrip() for line in text.split("\r")[1:]]
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Terminal]:
+    """Returns a function that makes the output a terminal whose bar is drawn at each episode."""
+
+    def make(columns: int = 200, encoding: str = "utf-8", term: str = "xterm") -> Terminal:
+        output = Terminal(io.BytesIO(), encoding=encoding, errors="replace", newline="")
+        monkeypatch.setattr(sys, "stdout", output)
+        monkeypatch.setattr("keras_pendulum.train.progress._SECONDS_BETWEEN_DRAWINGS", 0.0)
+        monkeypatch.setenv("TERM", term)
+        monkeypatch.setenv("COLUMNS", str(columns))
+        set_optimum(-4.0, monkeypatch)
+        return output
+
+    return make
+
+
+def set_optimum(optimum: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "keras_pendulum.evaluate.evaluation.optimal_training_return", lambda config: optimum
+        "keras_pendulum.optimum.pendulum.PendulumSolution.mean_best_return", lambda *_: optimum
     )
-    show = ProgressLines(kp.preset("reference"))
+
+
+@pytest.mark.parametrize(
+    ("episodes", "optimum", "means"),
+    [
+        (range(110), -4.5, ["40 to 49, -44.50, 40.00", "90 to 99, -94.50, 90.00"]),
+        (range(47, 51), -4.0, ["47 to 49, -48.00, 44.00"]),  # a resumed run
+        (range(50), float("nan"), ["40 to 49, -44.50"]),  # the optimum is not known
+    ],
+)
+def test_every_50_episodes_have_a_line_with_return_and_regret_of_the_last_10(
+    episodes: range,
+    optimum: float,
+    means: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    set_optimum(optimum, monkeypatch)
+    progress = make_progress(kp.preset("reference"))  # the output is not a terminal
+    expected = []
     for episode in episodes:
-        show(record(episode))
-    lines: list[str] = capsys.readouterr().out.splitlines()
-    return lines
-
-
-def test_every_50_episodes_have_a_line_with_the_regret_of_the_last_10(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    lines = printed(range(110), -4.5, monkeypatch, capsys)
-    assert [line for line in lines if line.startswith("Episode: ")] == [
-        record(episode).line() for episode in range(110)
-    ]
-    assert lines[49:52] == [
-        record(49).line(),
-        "Mean of episodes 40 to 49, random actions included: return -44.50, regret 40.00",
-        record(50).line(),
-    ]
-    assert lines[101] == (
-        "Mean of episodes 90 to 99, random actions included: return -94.50, regret 90.00"
-    )
-    assert len(lines) == 112
-
-
-def test_resumed_run_names_the_episodes_of_its_mean(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    lines = printed(range(47, 51), -4.0, monkeypatch, capsys)
-    assert lines[3] == (
-        "Mean of episodes 47 to 49, random actions included: return -48.00, regret 44.00"
-    )
-
-
-def test_line_has_no_regret_without_a_known_optimum(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    lines = printed(range(50), float("nan"), monkeypatch, capsys)
-    assert lines[-1] == "Mean of episodes 40 to 49, random actions included: return -44.50"
+        progress.on_episode(record(episode, episode_return=-float(episode)))
+        expected.append(record(episode).line())
+        if episode % 50 == 49:
+            numbers, mean, *regret = means.pop(0).split(", ")
+            line = f"Mean of episodes {numbers}, random actions included: return {mean}"
+            expected.append(", regret ".join([line, *regret]))
+    assert capsys.readouterr().out.splitlines() == expected
 
 
 def test_evaluation_has_a_line_after_that_of_its_episode(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    ProgressLines(kp.preset("reference"))(record(5, greedy_regret=1.2345))
+    make_progress(kp.preset("reference")).on_episode(record(5, greedy_regret=1.2345))
     assert capsys.readouterr().out.splitlines() == [
         record(5).line(),
         "Greedy policy after episode 5: regret 1.23",
     ]
+
+
+def figures(line: str) -> str:
+    """Returns the text beside the bar."""
+    return line.split(" ", 3)[3]
+
+
+def test_bar_shows_regret_and_speed_of_the_last_episodes(
+    terminal: Callable[..., Terminal],
+) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=100))
+    for episode in range(13):
+        bar.on_episode(record(episode))
+    lines = output.lines()
+    mean = sum(i**2 for i in range(4, 14)) / 10
+    speed = f"{STEPS / 0.5:.0f} steps/s"
+    assert lines[-1].startswith("training 13/100 ━━")
+    assert figures(lines[-1]) == (
+        f"return -169 regret {mean - 4:.4g} ε 0.50 loss 0.1 {speed} 0:44 left"
+    )
+    assert figures(lines[0]) == "return -1 regret -3 ε 0.50 loss 0.1"
+    assert figures(lines[1]) == f"return -4 regret -1.5 ε 0.50 loss 0.1 {speed} 0:49 left"
+
+
+def test_bar_shows_no_regret_without_a_known_optimum(
+    terminal: Callable[..., Terminal], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = terminal()
+    set_optimum(float("nan"), monkeypatch)
+    make_progress(kp.preset("reference", episodes=100)).on_episode(record(0))
+    assert "regret" not in "".join(output.lines())
+
+
+def test_time_left_is_shown_from_the_second_episode_with_updates(
+    terminal: Callable[..., Terminal],
+) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=100))
+    bar.on_episode(record(0, loss=float("nan"), seconds=0.01))
+    bar.on_phase("compiling")
+    bar.on_episode(record(1, seconds=90.0))
+    bar.on_episode(record(2, seconds=2.0))
+    assert [re.findall(r"\d+:\d+ left", line) for line in output.lines()] == [
+        *([], [], [], ["3:14 left"])
+    ]
+
+
+def test_time_left_is_never_0(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=5))
+    for episode in range(5):
+        bar.on_episode(record(episode, seconds=1e-4))
+    for phase in ("drawing", "evaluating", "finished"):
+        bar.on_phase(phase)
+    lines = output.lines()
+    assert [re.findall(r"\d+:\d+ left", line) for line in lines] == [
+        *([[]] + [["0:01 left"]] * 3),
+        *([[]] * 4),
+    ]
+    assert [line.split()[0] for line in lines[4:]] == [
+        *("training", "drawing", "evaluating", "finished")
+    ]
+
+
+def test_time_left_includes_the_remaining_evaluations(
+    terminal: Callable[..., Terminal], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = SimpleNamespace(now=100.0)
+    clock.monotonic = lambda: clock.now
+    monkeypatch.setattr("keras_pendulum.train.progress.time", clock)
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=50, evaluate_every=10))
+    for episode in range(9):
+        bar.on_episode(record(episode))
+    bar.on_phase("evaluating")
+    clock.now += 30.0
+    bar.on_episode(record(9, greedy_regret=12.345))
+    lines = output.lines()
+    assert lines[-2].startswith("evaluating 9/50 ")
+    assert lines[-1].startswith("training 10/50 ")
+    assert "greedy 12.35 " in lines[-1]
+    assert lines[-1].endswith("2:20 left")  # 40 episodes of 0.5 s and 4 evaluations of 30 s
+    bar.on_episode(record(10))
+    assert "greedy 12.35 " in output.lines()[-1]
+
+
+def test_phase_before_the_first_episode_is_shown(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=2))
+    bar.on_phase("drawing")
+    bar.end()
+    assert output.lines() == ["drawing"]
+
+
+def test_interrupted_run_has_no_time_left(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    bar = make_progress(kp.preset("reference", episodes=9))
+    bar.on_episode(record(0))
+    bar.on_episode(record(1))
+    bar.on_phase("interrupted")
+    *_, before, last = output.lines()
+    assert before.endswith("left")
+    assert last.startswith("interrupted 2/9 ")
+    assert "left" not in last
+
+
+def test_end_ends_the_line_once(terminal: Callable[..., Terminal]) -> None:
+    output = terminal(columns=60)
+    bar = make_progress(kp.preset("reference", episodes=9))
+    bar.end()
+    bar.on_episode(record(0))
+    bar.end()
+    bar.end()
+    output.flush()
+    assert isinstance(output.buffer, io.BytesIO)
+    assert output.buffer.getvalue().endswith(b"\n")
+    assert output.buffer.getvalue().count(b"\n") == 1
+
+
+def test_narrow_terminal_leaves_out_the_least_important_figures(
+    terminal: Callable[..., Terminal],
+) -> None:
+    shown = []
+    for columns in (90, 80, 70, 60, 50):
+        output = terminal(columns)
+        bar = make_progress(kp.preset("reference", episodes=100))
+        bar.on_episode(record(0))
+        bar.on_episode(record(1, greedy_regret=9.0, episode_return=-1.0))
+        _, line = output.lines()
+        assert len(line) < columns
+        assert "regret -3 greedy 9 " in line
+        shown.append([name for name in ("return", "ε", "loss", "steps/s", "left") if name in line])
+    assert shown == [
+        ["return", "ε", "loss", "steps/s", "left"],
+        ["return", "ε", "loss", "left"],
+        ["return", "ε", "left"],
+        ["return", "left"],
+        ["left"],
+    ]
+
+
+def drawn(output: Terminal) -> str:
+    """Returns the output for 1 and 2 of 2 episodes, the first with the longer line."""
+    bar = make_progress(kp.preset("reference", episodes=2))
+    for episode in range(2):
+        bar.on_episode(record(episode, seconds=3600.0 * (2 - episode)))
+    output.flush()
+    assert isinstance(output.buffer, io.BytesIO)
+    return output.buffer.getvalue().decode(output.encoding)
+
+
+def test_bar_needs_no_escape_codes(terminal: Callable[..., Terminal]) -> None:
+    longer, shorter = drawn(terminal(columns=60)).split("\r")[1:]
+    assert (longer + shorter).isprintable()
+    assert len(longer) == len(shorter) == 59  # nothing of the longer line is left
+    assert longer.startswith("training 1/2 ━━")
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
+def test_bar_has_other_marks_where_the_code_page_lacks_them(
+    encoding: str, terminal: Callable[..., Terminal]
+) -> None:
+    before, after = drawn(terminal(60, encoding)).split("\r")[1:]
+    assert before.startswith("training 1/2 ##")
+    assert re.fullmatch(r"#+-+", before.split()[2])
+    assert re.fullmatch(r"#+", after.split()[2])
+
+
+def test_dumb_terminal_gets_a_line_for_each_episode(terminal: Callable[..., Terminal]) -> None:
+    assert drawn(terminal(term="dumb")) == "".join(
+        f"{record(episode).line()}\n" for episode in range(2)
+    )
+
+
+def test_quiet_run_shows_nothing(terminal: Callable[..., Terminal]) -> None:
+    output = terminal()
+    progress = make_progress(kp.preset("reference", episodes=2), quiet=True)
+    assert type(progress) is Progress
+    progress.on_episode(record(0))
+    progress.on_phase("drawing")
+    progress.end()
+    assert output.lines() == []

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.optimum.discounted import discounted_return
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.optimum.optimal_return import discounted_return
 from keras_pendulum.train.reference_returns import reference_returns, run_title
 from keras_pendulum.version import __version__
 
@@ -37,7 +38,7 @@ def test_optimal_policy_for_the_discount_collects_less_than_the_optimum() -> Non
 
 
 def test_title_has_preset_seed_regret_task_and_version() -> None:
-    score = kp.Score("Pendulum-v1", 1.0, np.array([-41.5, -2.5]), np.array([-40.0, -2.0]))
+    score = kp.Score(Pendulum(), np.array([-41.5, -2.5]), np.array([-40.0, -2.0]))
     config = kp.preset("reference", seed=3)
     first, second = run_title(config, score).split("\n")
     assert first == "reference, seed 3: regret 1.00"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import asdict
 from typing import Any
@@ -10,11 +11,11 @@ from typing import Any
 import keras
 import numpy as np
 import pytest
+import tensorflow as tf
 
 import keras_pendulum as kp
-from keras_pendulum.dqn.exploration import make_schedule
+from keras_pendulum.dqn import target_network
 from keras_pendulum.dqn.losses import huber, mean_squared_error
-from keras_pendulum.dqn.network import Provenance
 from keras_pendulum.environments.actions import DiscreteActions, TorqueGrid, TruncatingTorqueGrid
 from keras_pendulum.train.run import make_optimizer, make_run
 
@@ -40,14 +41,57 @@ def test_run_has_the_parts_of_its_settings(
     assert run.agent.online.action_count == run.actions.count
     assert run.agent.online.observation_size == observation_size
     assert (run.agent.loss, run.agent.discount) == (loss, config.discount)
-    assert run.agent.double_q == config.double_q
-    assert (run.agent.target is run.agent.online) == (config.target_update == "none")
     assert run.agent.rng is run.streams.exploration
     assert (run.replay.capacity, len(run.replay)) == (300, 0)
-    assert run.epsilon == make_schedule(config)
     assert run.env.get_wrapper_attr("_max_episode_steps") == 7
     assert run.env.render_mode is None
     assert run.history == []
+
+
+@pytest.mark.parametrize(
+    ("double_q", "rule"),
+    [(False, target_network.q_learning), (True, target_network.double_q_learning)],
+)
+def test_agent_has_the_target_rule_of_the_settings(double_q: bool, rule: object) -> None:
+    agent = make_run(kp.preset("reference", double_q=double_q, hidden_units=(8,))).agent
+    assert agent.target_rule is rule
+
+
+@pytest.mark.parametrize(
+    ("settings", "values"),
+    [
+        ({"target_update": "none"}, [8, 8]),
+        ({"target_update": "hard", "target_period": 2}, [0, 8]),
+        ({"target_update": "soft", "tau": 0.25}, [2, 3.5]),
+    ],
+)
+def test_target_network_follows_the_rule_of_the_settings(
+    settings: dict[str, Any], values: list[float]
+) -> None:
+    agent = make_run(kp.preset("reference", hidden_units=(8,), **settings)).agent
+    assert (agent.target is agent.online) == (settings["target_update"] == "none")
+    for ours, theirs in zip(agent.target.get_weights(), agent.online.get_weights(), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    for network, value in ((agent.target, 0.0), (agent.online, 8.0)):
+        network.set_weights([np.full(array.shape, value) for array in network.get_weights()])
+    for step, value in enumerate(values, start=1):
+        agent.update_target(agent.online, agent.target, tf.constant(step))
+        assert {float(array.flat[0]) for array in agent.target.get_weights()} == {value}
+
+
+@pytest.mark.parametrize(
+    ("settings", "values"),
+    [
+        ({"epsilon_decay": 0.5}, [0.4, 0.1]),
+        ({"epsilon_schedule": "steps", "epsilon_decay_steps": 7}, [0.8, 0.1 + 0.7 / math.e]),
+    ],
+)
+def test_epsilon_follows_the_schedule_of_the_settings(
+    settings: dict[str, Any], values: list[float]
+) -> None:
+    settings = {"epsilon_start": 0.8, "epsilon_min": 0.1, **settings}
+    epsilon = make_run(kp.preset("reference", hidden_units=(8,), **settings)).epsilon
+    assert [epsilon(0, 0), epsilon(3, 7)] == pytest.approx(values)
 
 
 def test_gravity_reaches_the_environment() -> None:
@@ -63,11 +107,9 @@ def test_gravity_reaches_the_environment() -> None:
 def test_optimizer_has_the_numbers_of_the_settings(
     name: str, kind: Any, decay: float | None, clip: float | None
 ) -> None:
-    numbers: dict[str, Any] = {
-        "learning_rate": 0.25,
-        "optimizer_epsilon": 0.5,
-        "weight_decay": 0.03,
-    }
+    numbers: dict[str, Any] = {"learning_rate": 0.25, "optimizer_epsilon": 0.5}
+    if decay is not None:
+        numbers["weight_decay"] = decay
     config = kp.preset("original", optimizer=name, gradient_clip=clip, **numbers)
     optimizer: Any = make_optimizer(config)
     assert type(optimizer) is kind
@@ -120,8 +162,15 @@ def test_run_without_updates_has_a_learning_rate() -> None:
 def test_network_records_the_run_that_it_comes_from(name: str, gravity: float | None) -> None:
     config = kp.preset(name, hidden_units=(8,), seed=6)
     settings = json.dumps(asdict(config))
-    found = make_run(config).agent.online.provenance
-    assert found == Provenance(config.environment, gravity, name, 6, settings)
+    found = make_run(config).agent.online.metadata
+    physics = {} if gravity is None else {"gravity": gravity}
+    assert found == {
+        "environment": config.environment,
+        **physics,
+        "preset": name,
+        "seed": 6,
+        "config": settings,
+    }
 
 
 def test_another_seed_gives_other_initial_weights() -> None:
@@ -135,7 +184,7 @@ def test_initial_network_replaces_the_seeded_weights() -> None:
     initial = kp.DQN((8,), seed=77)
     agent = make_run(kp.preset("reference", hidden_units=(8,)), initial).agent
     assert agent.online is not initial
-    assert agent.online.provenance.preset == "reference"
+    assert agent.online.metadata["preset"] == "reference"
     for network in (agent.online, agent.target):
         for ours, theirs in zip(network.get_weights(), initial.get_weights(), strict=True):
             np.testing.assert_array_equal(ours, theirs)
@@ -154,7 +203,7 @@ def test_initial_network_replaces_the_seeded_weights() -> None:
             "has activation relu, the settings say tanh",
         ),
         (
-            kp.DQN((8,), 2, observation_size=4, provenance=Provenance("CartPole-v1")),
+            kp.DQN((8,), 2, observation_size=4, metadata={"environment": "CartPole-v1"}),
             "has environment CartPole-v1, the settings say Pendulum-v1",
         ),
     ],

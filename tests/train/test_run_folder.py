@@ -16,15 +16,14 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.storage import atomic_write
+from keras_pendulum.storage import atomic_write, run_folder
 from keras_pendulum.storage.atomic_write import write_atomically
-from keras_pendulum.train import run_folder
+from keras_pendulum.storage.run_folder import RunFolder, find_run
 from keras_pendulum.train.checkpoint import (
     CheckpointWriter,
     load_checkpoint,
     save_checkpoint,
 )
-from keras_pendulum.train.run_folder import RunFolder
 
 
 def test_run_leaves_its_four_files(tmp_path: Path) -> None:
@@ -138,7 +137,7 @@ def test_run_of_another_environment_is_removed_only_after_the_first_new_checkpoi
     assert (tmp_path / "pendulum_weight.h5").read_bytes() == policy
     kp.train_dqn(cartpole, tmp_path, overwrite=True)
     assert not (tmp_path / "pendulum_weight.h5").exists()
-    assert RunFolder(tmp_path).weights.name == "cartpole_weight.h5"
+    assert find_run(tmp_path).weights.name == "cartpole_weight.h5"
 
 
 def test_removed_history_is_whole_again_after_the_next_checkpoint(tmp_path: Path) -> None:
@@ -182,7 +181,7 @@ def test_picture_that_cannot_be_drawn_is_drawn_by_resume(
         raise error
 
     with monkeypatch.context() as patched:
-        patched.setattr("keras_pendulum.train.run_figure.draw_run", fail)
+        patched.setattr("keras_pendulum.figures.run_figure.draw_run", fail)
         with pytest.raises(kp.UserError, match=r"cannot draw .*rewards\.png: .*--resume draws it"):
             kp.train_dqn(config, tmp_path)
     assert len((tmp_path / "history.csv").read_text().splitlines()) == 3
@@ -240,7 +239,7 @@ def test_folder_with_two_checkpoints_needs_the_environment(tmp_path: Path) -> No
     cartpole = (tmp_path / "other" / "cartpole_weight.h5").rename(tmp_path / "cartpole_weight.h5")
     content = cartpole.read_bytes()
     with pytest.raises(kp.UserError, match=r"holds pendulum_weight\.h5 and cartpole_weight\.h5"):
-        RunFolder(tmp_path)
+        find_run(tmp_path)
     kp.train_dqn(replace(pendulum, episodes=3), tmp_path, resume=True)
     assert cartpole.read_bytes() == content
 
@@ -268,7 +267,7 @@ def test_folder_with_only_tensorboard_curves_is_used(tmp_path: Path) -> None:
 
 def test_folder_with_a_long_name_raises() -> None:
     with pytest.raises(kp.UserError, match=r"cannot read the folder a.*File name too long"):
-        RunFolder("a" * 300)
+        RunFolder("a" * 300, "Pendulum-v1")
 
 
 def test_on_checkpoint_can_save_weights_during_the_write(tmp_path: Path) -> None:
@@ -297,7 +296,7 @@ def test_picture_shows_the_optimal_and_the_random_return(
         drawn.append((returns["best possible"], returns["random actions"]))
         return b"a picture"
 
-    monkeypatch.setattr("keras_pendulum.train.run_figure.draw_run", draw)
+    monkeypatch.setattr("keras_pendulum.figures.run_figure.draw_run", draw)
     kp.train_dqn(kp.preset(preset, episodes=1, hidden_units=(8,)), tmp_path)
     assert (tmp_path / "rewards.png").read_bytes() == b"a picture"
     assert len(drawn) == 1

@@ -14,8 +14,8 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.atomic_write import write_atomically
+from keras_pendulum.storage.run_folder import RunFolder
 from keras_pendulum.train.checkpoint import load_checkpoint
-from keras_pendulum.train.run_folder import RunFolder
 
 if sys.platform == "win32":
     pytest.skip("needs links, pipes and moved folders", allow_module_level=True)
@@ -40,7 +40,7 @@ def test_run_does_not_write_through_a_link(name: str, tmp_path: Path) -> None:
 def test_pipe_in_place_of_a_file_of_the_run_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "history.csv")
     with pytest.raises(kp.UserError, match=r"history\.csv is a link, a folder or a device"):
-        RunFolder(tmp_path)
+        RunFolder(tmp_path, "Pendulum-v1")
 
 
 def test_link_changed_during_a_run_does_not_change_its_folder(tmp_path: Path) -> None:

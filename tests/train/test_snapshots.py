@@ -15,10 +15,10 @@ from conftest import Command, assert_same
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
+from keras_pendulum.storage.recorded_run import load_recorded_run
+from keras_pendulum.storage.run_folder import RunFolder
 from keras_pendulum.storage.snapshots import Snapshot, read_snapshots
-from keras_pendulum.train.checkpoint import load_history
-from keras_pendulum.train.run_folder import RunFolder
-from keras_pendulum.train.snapshots import Snapshots, due_episodes
+from keras_pendulum.train.folder_files import SnapshotsFile, due_episodes
 
 FILE = "pendulum_weight_snapshots.h5"
 CONFIG = kp.preset(
@@ -30,8 +30,8 @@ CONFIG = kp.preset(
 def no_picture() -> Iterator[None]:
     """Draws nothing."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("keras_pendulum.train.train_dqn.run_phase_planes", lambda *run: {})
-        patched.setattr("keras_pendulum.train.run_figure.draw_run", lambda *run: b"a picture")
+        patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
+        patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
         yield
 
 
@@ -51,7 +51,7 @@ def whole_run(
 
 def snapshots_in(folder: Path) -> list[Snapshot]:
     weights = folder / "pendulum_weight.h5"
-    _, history = load_history(weights)
+    history = load_recorded_run(weights).history
     return read_snapshots(folder / FILE, kp.load_weights(weights), history)
 
 
@@ -104,8 +104,12 @@ def killed_in(function: Callable[..., Any], call: int) -> Callable[..., Any]:
     [
         (RunFolder, "append", 5),  # after the snapshot of episode 3, before a checkpoint
         (RunFolder, "append", 11),
-        (Snapshots, "take_if_due", 1),  # before the initial network is kept
-        (Snapshots, "take_if_due", 7),  # before the snapshot after 6 episodes, with its checkpoint
+        (SnapshotsFile, "_take_if_due", 1),  # before the initial network is kept
+        (
+            SnapshotsFile,
+            "_take_if_due",
+            7,
+        ),  # before the snapshot after 6 episodes, with its checkpoint
     ],
 )
 def test_killed_and_resumed_run_leaves_the_same_file(

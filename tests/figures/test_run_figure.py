@@ -11,14 +11,15 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 import keras_pendulum as kp
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.figures import run_figure
+from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, NO_TORQUE
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.phase_plane import (
     PhasePlane,
     network_phase_plane,
     optimal_phase_plane,
 )
-from keras_pendulum.torque_colors import CLOCKWISE, COUNTERCLOCKWISE, NO_TORQUE
-from keras_pendulum.train import run_figure
 
 LEVELS = {"best possible": -40.0, "optimal policy for γ = 0.9": -41.0, "random actions": -900.0}
 TITLE = "reference, seed 0: regret 1.87\nPendulum-v1, g = 1 · keras_pendulum 0.1.0"
@@ -53,7 +54,7 @@ def test_no_text_of_a_run_overlaps_another_or_leaves_the_picture(
     episodes: int, every: int, with_planes: bool, planes: dict[str, PhasePlane]
 ) -> None:
     history, shown = make_history(episodes, every), planes if with_planes else {}
-    figure = figure_of(lambda: run_figure.draw_run(history, "Pendulum-v1", LEVELS, shown, TITLE))
+    figure = figure_of(lambda: run_figure.draw_run(history, Pendulum(), LEVELS, shown, TITLE))
     require_legible(figure)
     # Colour bars have axes of their own.
     assert len(figure.axes) == 3 + bool(every) + 6 * with_planes
@@ -74,7 +75,7 @@ def test_torques_have_the_colours_of_the_other_pictures(planes: dict[str, PhaseP
 def test_epsilon_is_visible_from_the_first_episode_on() -> None:
     for episodes, marker in ((1, "o"), (2, "")):
         axes = Figure().subplots()
-        run_figure.draw_epsilon(axes, make_history(episodes))
+        run_figure._draw_epsilon(axes, make_history(episodes))
         assert axes.get_lines()[0].get_marker() == marker
 
 
@@ -98,7 +99,7 @@ def test_labels_of_the_loss_have_one_form(losses: tuple[float, ...], labels: set
 
 
 def test_picture_is_a_png() -> None:
-    png = run_figure.draw_run(make_history(2), "Pendulum-v1", LEVELS, {})
+    png = run_figure.draw_run(make_history(2), Pendulum(), LEVELS, {})
     assert matplotlib.image.imread(io.BytesIO(png)).shape[1] == 960
 
 
@@ -119,10 +120,8 @@ def test_greedy_regret_is_drawn_by_episode_with_its_best() -> None:
     assert high > 1000
 
 
-def test_phase_planes_have_their_lowest_speed_at_the_bottom() -> None:
-    figure = Figure()
-    planes = {"optimum": optimal_phase_plane(1.0, 0.5)}
-    run_figure._draw_planes(figure, figure.add_gridspec(1, 1)[0], planes)
+def test_phase_planes_have_their_lowest_speed_at_the_bottom(planes: dict[str, PhasePlane]) -> None:
+    figure = figure_of(lambda: run_figure.draw_phase_planes({"optimum": planes["two"]}))
     images = [image for axes in figure.axes for image in axes.get_images()]
     assert [image.origin for image in images] == ["lower", "lower"]
     assert images[0].get_extent() == pytest.approx((-math.pi, math.pi, -8, 8))

@@ -1,0 +1,46 @@
+"""What all pictures share: their fonts, the colours of torques, names, and the PNG file.
+
+The colours of torques are the same in every picture and on the page. They are distinct for
+colour-blind people. In black and white the two directions look alike, so each picture also tells
+them apart in another way: by place, sign or hatching.
+"""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Matplotlib's settings, for `rc_context`. The texts are legible at half the size too.
+STYLE: Any = {"font.size": 12, "axes.titlesize": "medium", "hatch.linewidth": 0.6}
+CLOCKWISE = "#1c66ad"  # below 0 N·m
+NO_TORQUE = "#f4f2ec"
+COUNTERCLOCKWISE = "#d4620a"  # above 0 N·m
+SCALE = (CLOCKWISE, NO_TORQUE, COUNTERCLOCKWISE)  # from -2 to 2 N·m
+
+
+def torque_color(torque: float) -> str:
+    """Returns the colour of the direction of a torque."""
+    return CLOCKWISE if torque < 0 else COUNTERCLOCKWISE
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Returns red, green and blue, 0 to 255, of a colour such as `#1c66ad`."""
+    red, green, blue = bytes.fromhex(color[1:])
+    return red, green, blue
+
+
+def plain_text(text: str, letters: int) -> str:
+    """Returns a text for Matplotlib to draw letter by letter, in lines of so many letters."""
+    # A dollar sign would start a formula.
+    return textwrap.fill(text, letters).replace("$", r"\$")
+
+
+def png(figure: Figure) -> bytes:
+    """Returns the figure as a PNG file."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=100)
+    return stream.getvalue()

@@ -1,0 +1,56 @@
+"""A listener: what happens beside the training of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from keras_pendulum.dqn.network import DQN
+    from keras_pendulum.history import EpisodeRecord
+
+Phase = Literal["compiling", "evaluating", "drawing"]
+
+
+class Listener:
+    """Follows a run. A subclass overrides the methods that it needs."""
+
+    def on_start(self) -> None:
+        """Called before the first episode of this process."""
+
+    def on_phase(self, phase: Phase) -> None:
+        """Called when another phase than the training starts. The next record ends the phase."""
+
+    def on_episode(self, record: EpisodeRecord) -> None:
+        """Called after each episode, with its complete record."""
+
+    def on_checkpoint(self, network: DQN, episode: int) -> None:
+        """Called at each checkpoint, with the network and the last episode."""
+
+    def on_end(self) -> None:
+        """Called after the last episode, also where `should_stop` ended the run."""
+
+
+class FunctionListener(Listener):
+    """A listener that calls functions; those that are not given do nothing."""
+
+    def __init__(
+        self,
+        on_episode: Callable[[EpisodeRecord], None] = lambda record: None,
+        *,
+        on_checkpoint: Callable[[DQN, int], None] = lambda network, episode: None,
+        on_phase: Callable[[Phase], None] = lambda phase: None,
+    ) -> None:
+        self._functions = on_episode, on_checkpoint, on_phase
+
+    def on_episode(self, record: EpisodeRecord) -> None:
+        """Calls the first function."""
+        self._functions[0](record)
+
+    def on_checkpoint(self, network: DQN, episode: int) -> None:
+        """Calls the second function."""
+        self._functions[1](network, episode)
+
+    def on_phase(self, phase: Phase) -> None:
+        """Calls the third function."""
+        self._functions[2](phase)
