@@ -7,14 +7,12 @@ alone decides which torque is chosen.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-QValues = Callable[[NDArray[np.float32]], Array]  # from observations [B, 3] to [B, A]
 
 
 class Fit(NamedTuple):
@@ -53,19 +51,14 @@ def advantage_fit(learned: Array, exact: Array) -> Fit:
     return line_fit(advantages(learned), advantages(exact))
 
 
-def torque_slopes(q: Array, torques: Array) -> Array:
-    """Returns how fast each state's Q-values grow with the torque, [N], per N·m."""
-    centred = torques - torques.mean()
-    return advantages(q) @ centred / (centred @ centred)
-
-
 def output_torques(learned: Array, exact: Array, torques: Array) -> Array:
     """Returns the torque that each output behaves like, [A], as a multiple of one unknown scale.
 
     The exact advantage is nearly proportional to the torque: λ(s)·u. Each output's advantage is
     projected on λ, so a healthy network gives its own torques times the slope of its values.
     """
-    direction = torque_slopes(exact, torques)  # [N]
+    centred = torques - torques.mean()
+    direction = advantages(exact) @ centred / (centred @ centred)  # [N]: λ, per N·m
     square = direction @ direction
     found: Array = advantages(learned).T @ direction / (square if square > 0 else 1.0)
     return found
@@ -82,17 +75,6 @@ def output_outliers(learned: Array, exact: Array) -> Array:
     return distance / max(spread, 1e-9 * (1 + np.abs(learned).max()))
 
 
-def asymmetry(q: Array, mirrored_q: Array) -> float:
-    """Returns the root mean square of Q(s, u) - Q(-s, -u), as a share of the spread of Q.
-
-    Args:
-        q: [N, A] at some states.
-        mirrored_q: [N, A] at the mirrored states; its columns are turned round here.
-    """
-    spread = q.std()
-    return float(np.sqrt(np.mean((q - mirrored_q[:, ::-1]) ** 2)) / spread) if spread > 0 else 0.0
-
-
 def relative_error(learned: Array, exact: Array) -> Array:
     """Returns each state's error after the best straight line, as a share of the exact spread."""
     values, truth = learned.mean(axis=1), exact.mean(axis=1)
@@ -100,19 +82,3 @@ def relative_error(learned: Array, exact: Array) -> Array:
     slope = fit.slope if abs(fit.slope) > 1e-9 else 1.0
     spread = max(truth.std(), 1e-9)
     return np.asarray(np.abs((values - fit.offset) / slope - truth) / spread)
-
-
-def saturation(hidden: list[NDArray[np.float32]], activations: list[str]) -> tuple[float, float]:
-    """Returns the shares of saturated tanh outputs and of ReLU units that are never active.
-
-    Args:
-        hidden: the outputs [N, units] of each hidden layer.
-        activations: of each layer.
-    """
-    saturated, dead = [0.0], [0.0]
-    for layer, activation in zip(hidden, activations, strict=True):
-        if activation == "tanh":
-            saturated.append(float((np.abs(layer) > 0.99).mean()))
-        elif activation == "relu":
-            dead.append(float((layer.max(axis=0) <= 0).mean()))
-    return max(saturated), max(dead)

@@ -1,6 +1,5 @@
 """The command `python -m keras_pendulum.diagnose`: what is wrong with an agent."""
 
-# PYTHON_ARGCOMPLETE_OK
 from __future__ import annotations
 
 import argparse
@@ -9,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
+from keras_pendulum.cli import OneLineParser, add_torques_flag, nonempty_path, run_command
 from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.storage.shipped_weights import shipped_names
@@ -26,8 +25,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "agent",
         type=nonempty_path,
         metavar="AGENT|RUN_FOLDER",
-        help="a weights file, the name of a shipped one, file.py:name, package.module:name, or the "
-        "folder of a run, which tells more",
+        help="a weights file, the name of a shipped one, file.py:name, package.module:name, or a "
+        "run folder (its history and replay buffer are used, too)",
     )
     parser.add_argument(
         "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
@@ -35,12 +34,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     parser.add_argument(
         "--discount", type=float, metavar="γ", help="discount [recorded in the file, else 0.9]"
     )
-    parser.add_argument(
-        "--torques",
-        type=_torques,
-        metavar="U,U,…",
-        help="torques of the outputs in N·m; write --torques=-2,… [evenly spaced from -2 to 2]",
-    )
+    add_torques_flag(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(
         "--report", type=nonempty_path, metavar="FILE.html", help="save a page with a picture"
@@ -50,32 +44,24 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     return run_command(lambda: _diagnose(arguments))
 
 
-def _torques(text: str) -> list[float]:
-    """Returns the torques of "-2,0,2". Raises ArgumentTypeError for other text."""
-    try:
-        return [float(word) for word in text.split(",")]
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no list of numbers; expected such as -2,0,2"
-        ) from error
-
-
 def _diagnose(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     if arguments.report:
         require_no_other_file(Path(arguments.report), b"<!DOCTYPE html>", "an HTML file")
 
     with fast_import():
-        from keras_pendulum.diagnose.diagnosis import diagnose
-        from keras_pendulum.diagnose.report import as_html
-        from keras_pendulum.evaluate.user_code import load_code, names_code
+        from keras_pendulum.diagnosis.diagnosis import diagnose
+        from keras_pendulum.diagnosis.report import as_html
+        from keras_pendulum.evaluate.named_policy import named_policy
+        from keras_pendulum.storage.run_folder import find_run_if_folder
 
-    agent = arguments.agent
+    agent, torques = arguments.agent, arguments.torques
+    if find_run_if_folder(agent) is None:
+        policy = named_policy(agent, torques)
+        policy.name = agent
+        agent, torques = policy, None
     diagnosis = diagnose(
-        load_code(agent) if names_code(agent) else agent,
-        gravity=arguments.gravity,
-        discount=arguments.discount,
-        torques=arguments.torques,
+        agent, gravity=arguments.gravity, discount=arguments.discount, torques=torques
     )
     if arguments.report:
         write_atomically(arguments.report, as_html(diagnosis).encode())

@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
+from exact_agent import exact_values, measure
 
-from keras_pendulum.diagnose import signals
+import keras_pendulum as kp
+from keras_pendulum.diagnosis import signals
+from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.evaluate.q_policies import DQNPolicy
 
 EXACT = np.random.RandomState(0).normal(size=(200, 1)) * np.linspace(-2, 2, 41) - 5
 TORQUES = np.linspace(-2, 2, 41)
@@ -22,10 +27,6 @@ def test_advantages_leave_no_value_of_the_state() -> None:
     assert signals.advantages(EXACT + 7) == pytest.approx(signals.advantages(EXACT))
 
 
-def test_output_torques_of_exact_values_are_the_torques() -> None:
-    assert signals.output_torques(EXACT, EXACT, TORQUES) == pytest.approx(TORQUES)
-
-
 def test_output_torques_follow_a_permutation_and_a_scale() -> None:
     order = np.random.RandomState(1).permutation(41)
     found = signals.output_torques(0.5 * EXACT[:, order], EXACT, TORQUES)
@@ -41,19 +42,23 @@ def test_output_outliers_mark_the_outputs_that_were_never_learned() -> None:
     assert signals.output_outliers(EXACT + noise, EXACT).max() < 7
 
 
-def test_asymmetry_compares_the_mirrored_torque() -> None:
-    assert signals.asymmetry(EXACT, EXACT[:, ::-1]) == 0
-    assert signals.asymmetry(EXACT, EXACT) > 1
-    assert signals.asymmetry(np.ones((3, 2)), np.ones((3, 2))) == 0
-
-
 def test_relative_error_ignores_scale_and_offset() -> None:
     states = np.linspace(-9, 0, 50)[:, None] + np.zeros((50, 3))
     assert signals.relative_error(2 * states - 4, states) == pytest.approx(0, abs=1e-9)
 
 
-def test_saturation_counts_saturated_and_dead_units() -> None:
-    saturated = np.array([[1, -1, 0.5, 0], [1, 1, 0.5, 0]], np.float32)
-    dead = np.array([[0, 2], [0, 0]], np.float32)
-    assert signals.saturation([saturated, dead], ["tanh", "relu"]) == (0.5, 0.5)
-    assert signals.saturation([dead], ["linear"]) == (0, 0)
+def test_asymmetry_compares_the_mirrored_state_and_torque() -> None:
+    assert measure(exact_values).asymmetry == pytest.approx(0, abs=1e-6)
+    assert measure(lambda o: exact_values(o) + 20 * o[:, 1:2]).asymmetry > 0.5
+    assert measure(lambda o: np.ones((len(o), 41))).asymmetry == 0
+
+
+def test_units_counts_saturated_and_dead_units() -> None:
+    network = kp.DQN((4, 2), activation="tanh,relu")
+    kernel, bias, *rest = network.get_weights()
+    biases = np.array([9, -9, 0.5, 0], np.float32)  # two are saturated
+    network.set_weights(
+        [0 * kernel, bias + biases, 0 * rest[0], np.array([-1, 1], np.float32), *rest[2:]]
+    )
+    assert Measurement(DQNPolicy(network), Pendulum(), 0.9).units == (0.5, 0.5)
+    assert measure(exact_values).units == (0, 0)

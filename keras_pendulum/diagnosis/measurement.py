@@ -2,38 +2,64 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnose import signals
-from keras_pendulum.diagnose.signals import Fit
-from keras_pendulum.diagnose.states import (
+from keras_pendulum.diagnosis import signals
+from keras_pendulum.diagnosis.run_record import RunRecord
+from keras_pendulum.diagnosis.signals import Array, Fit
+from keras_pendulum.diagnosis.states import (
     Episodes,
     observe,
     plane_states,
     simulate,
     training_states,
 )
-from keras_pendulum.diagnose.subject import Array, Subject
-from keras_pendulum.dqn.policy import activations_of
-from keras_pendulum.environments.tasks import pendulum_starts
-from keras_pendulum.evaluate.evaluation import random_return
-from keras_pendulum.optimum.discounted import discounted_return, discounted_value, exact_q
-from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
-from keras_pendulum.optimum.optimal_return import optimal_return
+from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
+from keras_pendulum.environments.actions import TorqueActions
+from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
+from keras_pendulum.evaluate.policy import Observations, Policy
+from keras_pendulum.evaluate.q_policies import DQNPolicy
+from keras_pendulum.optimum.discounted import discounted_value, exact_q
+from keras_pendulum.optimum.dynamics import step_all_torques
+from keras_pendulum.optimum.optimal_return import discounted_return, optimal_return
+from keras_pendulum.optimum.solutions import solution
 
 STARTS = 60  # seeds 0, 1, …
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """The signals of one agent. Those of Q-values are only there where the agent has them."""
+    """The signals of a policy on its declared task, each computed when it is first used.
 
-    subject: Subject
-    table: NDArray[np.float32] = field(repr=False)  # exact V of the declared task
+    Those of Q-values are only there where the policy has them.
+    """
+
+    policy: Policy
+    task: Pendulum
+    discount: float  # γ
+    reward_scale: float = 1.0  # declared factor on the rewards
+    record: RunRecord | None = None  # of the run that trained the policy
+
+    @property
+    def torques(self) -> Array:
+        """The torques [A] of the outputs in N·m."""
+        actions = self.policy.actions
+        assert isinstance(actions, TorqueActions)
+        return actions.torques
+
+    def act(self, observations: Observations) -> Array:
+        """Returns the torques [B] in N·m."""
+        return np.asarray(self.policy.act(observations)[:, 0])
+
+    def q_values(self, observations: Observations) -> Array:
+        """Returns the learned Q-values [B, A] in units of return."""
+        with np.errstate(all="ignore"):
+            q = np.asarray(self.policy.q_values(observations), np.float64)
+        return q / self.reward_scale
 
     @cached_property
     def starts(self) -> Array:
@@ -43,17 +69,17 @@ class Measurement:
     @cached_property
     def episodes(self) -> Episodes:
         """The agent's episodes."""
-        return simulate(self.subject.act, self.subject.gravity, self.starts)
+        return simulate(self.act, self.task.gravity, self.starts)
 
     @cached_property
     def optimum(self) -> float:
         """The mean optimal return of the starts."""
-        return float(optimal_return(self.subject.gravity, range(STARTS)).mean())
+        return float(optimal_return(self.task.gravity, range(STARTS)).mean())
 
     @cached_property
     def discount_cost(self) -> float:
         """The regret of the exact policy for the declared discount."""
-        returns = discounted_return(self.subject.gravity, self.subject.discount, range(STARTS))
+        returns = discounted_return(self.task.gravity, self.discount, range(STARTS))
         return max(0.0, self.optimum - float(returns.mean()))
 
     @cached_property
@@ -62,42 +88,37 @@ class Measurement:
         return self.optimum - float(self.episodes.returns.mean())
 
     @cached_property
-    def little(self) -> float:
-        """The regret that counts as little: 1 % of the way from random torques to the optimum.
+    def regret_tolerance(self) -> float:
+        """The regret that needs no finding: 1 % of the way from random torques to the optimum.
 
         What the discount costs comes on top, because no training can win it back.
         """
-        way = self.optimum - random_return("Pendulum-v1", self.subject.gravity, 200)
+        way = self.optimum - solution(self.task).random_return()
         return 0.01 * max(way, 1.0) + self.discount_cost
 
-    def exact(self, states: Array) -> Array:
-        """Returns the exact Q-values [N, A] of the declared task for the agent's outputs."""
-        subject = self.subject
-        assert subject.torques is not None
-        return exact_q(
-            self.table,
-            subject.gravity,
-            subject.discount,
-            states[:, 0],
-            states[:, 1],
-            subject.torques,
-        )
+    @cached_property
+    def table(self) -> NDArray[np.float32]:
+        """V of the declared task, as `discounted_value` returns it."""
+        return discounted_value(self.task.gravity, self.discount)
 
     @cached_property
     def states(self) -> Array:
         """States [N, 2] that a run of this task meets."""
-        subject = self.subject
-        return training_states(self.table, subject.gravity, subject.discount, self.starts)
+        return training_states(self.table, self.task.gravity, self.discount, self.starts)
 
     @cached_property
     def learned_q(self) -> Array:
         """The learned Q-values [N, A] at `states`."""
-        return self.subject.q_values(observe(self.states))
+        return self.q_values(observe(self.states))
 
     @cached_property
     def exact_q(self) -> Array:
         """The exact Q-values [N, A] at `states`."""
-        return self.exact(self.states)
+        return self._exact_q(self.states)
+
+    def _exact_q(self, states: Array) -> Array:
+        theta, speed = states.T
+        return exact_q(self.table, self.task.gravity, self.discount, theta, speed, self.torques)
 
     @cached_property
     def finite(self) -> bool:
@@ -118,7 +139,7 @@ class Measurement:
     def plane_value(self) -> Fit:
         """The fit of the values on the whole plane."""
         states = plane_states()
-        return signals.value_fit(self.subject.q_values(observe(states)), self.exact(states))
+        return signals.value_fit(self.q_values(observe(states)), self._exact_q(states))
 
     @cached_property
     def advantage_size(self) -> float:
@@ -129,8 +150,7 @@ class Measurement:
     @cached_property
     def output_torques(self) -> Array:
         """The torque [A] that each output behaves like, in N·m."""
-        assert self.subject.torques is not None
-        found = signals.output_torques(self.learned_q, self.exact_q, self.subject.torques)
+        found = signals.output_torques(self.learned_q, self.exact_q, self.torques)
         return found / (self.value.slope or 1.0)
 
     @cached_property
@@ -140,47 +160,38 @@ class Measurement:
 
     @cached_property
     def asymmetry(self) -> float:
-        """The asymmetry of the learned values."""
-        return signals.asymmetry(self.learned_q, self.subject.q_values(observe(-self.states)))
+        """The root mean square of Q(s, u) - Q(-s, -u), as a share of the spread of Q."""
+        q, mirrored_q = self.learned_q, self.q_values(observe(-self.states))[:, ::-1]
+        spread = q.std()
+        return float(np.sqrt(np.mean((q - mirrored_q) ** 2)) / spread) if spread > 0 else 0.0
 
     @cached_property
     def td_error(self) -> float:
         """The root mean square of the exact TD error, as a share of the spread of exact values."""
-        subject, states = self.subject, self.states[:400]
-        assert subject.torques is not None
+        states = self.states[:400]
         reward, theta, speed = step_all_torques(
-            subject.gravity, states[:, 0], states[:, 1], subject.torques
+            self.task.gravity, states[:, 0], states[:, 1], self.torques
         )
-        flat = np.stack([theta.ravel(), speed.ravel()], axis=1)
-        best = subject.q_values(observe(flat)).max(axis=1).reshape(reward.shape)
-        error = reward + subject.discount * best - subject.q_values(observe(states))
-        return float(np.sqrt(np.mean(error**2)) / self.exact_q.mean(axis=1).std())
-
-    @cached_property
-    def predicted(self) -> float:
-        """The highest learned value of the starts, on average."""
-        return float(self.subject.q_values(observe(self.starts)).max(axis=1).mean())
-
-    @cached_property
-    def collected(self) -> float:
-        """The discounted return that the agent collects from the starts, on average."""
-        return float(self.episodes.discounted(self.subject.discount).mean())
+        following = np.stack([theta.ravel(), speed.ravel()], axis=1)
+        best = self.q_values(observe(following)).max(axis=1).reshape(reward.shape)
+        error = reward + self.discount * best - self.q_values(observe(states))
+        return float(np.sqrt(np.mean(error**2)) / self.value_spread)
 
     @cached_property
     def excess(self) -> float:
-        """Returns the distance of the highest learned value above the optimum, in spreads."""
+        """The distance of the highest learned value above the optimum, in spreads."""
         excess = self.learned_q.max(axis=1) - self.exact_q.max(axis=1)
         return float(np.median(excess)) / self.value_spread
 
     @cached_property
-    def promise(self) -> float:
+    def value_overestimate(self) -> float:
         """The median of the highest learned value minus what the agent collects, in spreads.
 
         The states are those of the first half of the agent's episodes.
         """
         episodes, half = self.episodes, len(self.episodes.rewards) // 2
-        collected = episodes.returns_to_go(self.subject.discount)[:half:5]
-        learned = self.subject.q_values(observe(episodes.states[:half:5].reshape(-1, 2)))
+        collected = episodes.returns_to_go(self.discount)[:half:5]
+        learned = self.q_values(observe(episodes.states[:half:5].reshape(-1, 2)))
         return float(np.median(learned.max(axis=1) - collected.ravel())) / self.value_spread
 
     @cached_property
@@ -207,27 +218,20 @@ class Measurement:
 
     @cached_property
     def units(self) -> tuple[float, float]:
-        """The shares of saturated tanh outputs and of dead ReLU units; 0 without a network."""
-        network = self.subject.network
-        if network is None:
+        """The shares of saturated tanh outputs and of dead ReLU units, of the worst layer.
+
+        Both are 0 where the policy is not that of a DQN.
+        """
+        policy = self.policy
+        if not isinstance(policy, DQNPolicy):
             return 0.0, 0.0
-        weights = network.get_weights()
-        names = activations_of(network.activation, len(weights) // 2 - 1)
-        hidden, features = [], observe(self.states)
+        weights = policy.weights
+        names = activations_of(policy.activation, len(weights) // 2 - 1)
+        saturated, dead, features = [0.0], [0.0], observe(self.states)
         for kernel, bias, name in zip(weights[:-2:2], weights[1:-2:2], names, strict=True):
-            features = features @ kernel + bias
-            if name != "linear":
-                features = np.tanh(features) if name == "tanh" else np.maximum(features, 0)
-            hidden.append(features)
-        return signals.saturation(hidden, names)
-
-    @cached_property
-    def torque_use(self) -> Array:
-        """The share [41] of each torque of the usual grid in the agent's episodes."""
-        indices = np.abs(self.episodes.torques[..., None] - TORQUES).argmin(axis=-1)
-        return np.bincount(indices.ravel(), minlength=len(TORQUES)) / indices.size
-
-
-def measure(subject: Subject) -> Measurement:
-    """Returns the measurement of an agent. The exact values of its task are solved or loaded."""
-    return Measurement(subject, discounted_value(subject.gravity, subject.discount))
+            features = ACTIVATIONS[name](features @ kernel + bias)
+            if name == "tanh":
+                saturated.append(float((np.abs(features) > 0.99).mean()))
+            elif name == "relu":
+                dead.append(float((features.max(axis=0) <= 0).mean()))
+        return max(saturated), max(dead)

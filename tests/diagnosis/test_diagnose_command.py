@@ -2,22 +2,19 @@ import json
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import Refusal
-from exact_agent import coarse_value, exact_values, subject
+from exact_agent import coarse_value, diagnose_values, exact_values
 
 import keras_pendulum as kp
-from keras_pendulum.diagnose import __main__ as command
-from keras_pendulum.diagnose import comparisons, measurement
-from keras_pendulum.diagnose.diagnosis import diagnose, diagnose_subject
-from keras_pendulum.diagnose.report import as_html
+from keras_pendulum.diagnosis import __main__ as command
+from keras_pendulum.diagnosis import measurement
+from keras_pendulum.diagnosis.report import as_html
 
 
 @pytest.fixture(autouse=True)
 def _coarse_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measurement, "discounted_value", coarse_value)
-    monkeypatch.setattr(comparisons, "other_value", coarse_value)
 
 
 @pytest.fixture
@@ -27,18 +24,22 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_function_is_not_hidden_by_the_room_of_its_name() -> None:
-    assert kp.diagnose is diagnose
-    assert kp.diagnose is diagnose  # the first use has imported the room
-    assert command.main.__module__ == "keras_pendulum.diagnose.__main__"
-
-
 def test_first_line_is_the_answer(weights: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main([str(weights)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("too-few-updates: slope of learned on exact values ")
     assert "g = 1, γ = 0.9, 60 starts" in lines[1]
     assert "   Read: docs/diagnose.md#too-few-updates" in lines
+
+
+def test_agent_has_the_name_that_was_typed(
+    weights: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(weights.parent)
+    Path("code.py").write_text("def hold(observation):\n    return 2.0\n", encoding="utf-8")
+    for word in (weights.name, "code.py:hold"):
+        assert command.main([word]) == 0
+        assert f"\nAgent {word}, g = 1, " in capsys.readouterr().out
 
 
 def test_json_has_findings_and_signals(weights: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -56,26 +57,15 @@ def test_report_is_one_escaped_file(weights: Path, tmp_path: Path) -> None:
     assert text.startswith("<!DOCTYPE html>") and "width=device-width" in text
     assert not re.findall(r'(?:src|href)="(?!data:)', text)
 
-    agent = subject(lambda o: exact_values(o)[:, ::-1])
-    named = type(agent)(**{**vars(agent), "name": '<script>alert("x")</script>$\n'})
-    page = as_html(diagnose_subject(named))
+    diagnosis = diagnose_values(lambda o: exact_values(o)[:, ::-1])
+    diagnosis.measurement.policy.name = '<script>alert("x")</script>$\n'
+    page = as_html(diagnosis)
     assert "<script" not in page and "&lt;script&gt;" in page
 
 
 def test_figure_is_drawn_without_q_values_too() -> None:
-    def push(observation: object) -> float:
-        return 2.0
-
-    figure = diagnose(push, gravity=1.0, discount=0.9).figure()
-    assert len(figure.axes) == 1
-    assert len(diagnose_subject(subject(exact_values)).figure().axes) == 4
-
-
-def test_values_that_are_not_finite_are_a_finding() -> None:
-    agent = kp.q_function(lambda o: np.zeros((len(o), 41)))
-    found = diagnose(agent)
-    assert found.findings[0].name == "broken-network"
-    json.dumps(found.as_json(), allow_nan=False)
+    assert len(diagnose_values(exact_values, bare=True).figure().axes) == 1
+    assert len(diagnose_values(exact_values).figure().axes) == 4
 
 
 @pytest.mark.parametrize(
@@ -86,12 +76,14 @@ def test_values_that_are_not_finite_are_a_finding() -> None:
         (["{weights}", "--discount", "2"], "error: discount is 2"),
         (["{weights}", "--torques=a"], "error: argument --torques: 'a' is no list of numbers"),
         (["{weights}", "--torques=-1,1"], "error: torques has 2 numbers"),
-        (["{folder}"], "error: {folder}: holds no run of Pendulum-v1"),
-        (["cartpole"], "error: the agent belongs to CartPole-v1"),
+        (["{folder}"], "error: {folder}: holds no run (no pendulum_weight.h5"),
+        (["{folder}/agents.py:Trainer"], "error: {folder}/agents.py:Trainer: agent is the class "),
+        (["cartpole"], "error: cartpole belongs to CartPole-v1; diagnose is for"),
         (["{weights}", "--report", "{weights}"], "error: {weights} holds something else than"),
     ],
 )
 def test_mistake_is_one_line(words: list[str], line: str, weights: Path, refusal: Refusal) -> None:
+    (weights.parent / "agents.py").write_text("class Trainer: pass", encoding="utf-8")
     names = {"weights": weights.as_posix(), "folder": weights.parent.as_posix()}
     found = refusal(command.main, [word.format(**names) for word in words])
     assert found.startswith(line.format(**names))

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from conftest import ROOT
 
-from benchmarks.fault_pictures import PICTURES, picture_cases
-from benchmarks.labelled_networks import FAULTS
-from keras_pendulum.diagnose.texts import TEXTS
+from benchmarks.diagnosis.labelled_networks import FAULTS
+from benchmarks.pages.fault_pictures import PICTURES, picture_cases
+from keras_pendulum.diagnosis.faults import FAULTS as TEXTS
 
 DIAGNOSE = (ROOT / "docs" / "diagnose.md").read_text(encoding="utf-8")
 LEARN = (ROOT / "docs" / "my_dqn_does_not_learn.md").read_text(encoding="utf-8")

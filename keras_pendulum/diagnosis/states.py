@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.actions import MAX_TORQUE
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE
-from keras_pendulum.optimum.dynamics import MAX_SPEED, TORQUES, step_all_torques
+from keras_pendulum.diagnosis.signals import Array
+from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
 from keras_pendulum.optimum.value_iteration import value_at
 
-Array = NDArray[np.float64]
 # From observations [B, 3] to torques [B] in N·m.
 Act = Callable[[NDArray[np.float32]], Array]
 
@@ -31,17 +31,12 @@ class Episodes:
     """Simulated episodes from B starts."""
 
     states: Array  # [steps, B, 2], θ in rad and θ̇ in rad/s
-    torques: Array  # [steps, B] N·m
     rewards: Array  # [steps, B]
 
     @property
     def returns(self) -> Array:
         """The undiscounted returns [B]."""
         return np.asarray(self.rewards.sum(axis=0))
-
-    def discounted(self, discount: float) -> Array:
-        """Returns the discounted sums of the rewards from the first step, [B]."""
-        return np.asarray(self.returns_to_go(discount)[0])
 
     def returns_to_go(self, discount: float) -> Array:
         """Returns the discounted sums of the rewards from each step on, [steps, B]."""
@@ -51,25 +46,24 @@ class Episodes:
         return sums
 
 
-def simulate(act: Act, gravity: float, starts: Array, steps: int = STEPS_PER_EPISODE) -> Episodes:
+def simulate(act: Act, gravity: float, starts: Array) -> Episodes:
     """Returns the episodes of a policy; a torque that is no finite number counts as 0.
 
     Args:
         act: the policy.
         gravity: m/s².
         starts: [B, 2], θ in rad and θ̇ in rad/s.
-        steps: steps per episode.
     """
-    states = np.empty((steps, *starts.shape))
-    torques, rewards = np.empty((2, steps, len(starts)))
+    states = np.empty((STEPS_PER_EPISODE, *starts.shape))
+    rewards = np.empty(states.shape[:2])
     state = starts
-    for step in range(steps):
+    for step in range(STEPS_PER_EPISODE):
         torque = np.nan_to_num(np.asarray(act(observe(state)), np.float64), posinf=0, neginf=0)
         torque = np.clip(torque, -MAX_TORQUE, MAX_TORQUE)
         reward, theta, speed = step_all_torques(gravity, state[:, 0], state[:, 1], torque[:, None])
-        states[step], torques[step], rewards[step] = state, torque, reward[:, 0]
+        states[step], rewards[step] = state, reward[:, 0]
         state = np.stack([theta[:, 0], speed[:, 0]], axis=1)
-    return Episodes(states, torques, rewards)
+    return Episodes(states, rewards)
 
 
 def plane_states() -> Array:

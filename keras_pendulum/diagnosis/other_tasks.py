@@ -2,7 +2,7 @@
 
 The package contains coarse tables of 56 tasks. This command writes them:
 
-    python -m keras_pendulum.diagnose.other_tasks FILE.npz
+    python -m keras_pendulum.diagnosis.other_tasks FILE.npz
 """
 
 from __future__ import annotations
@@ -25,34 +25,30 @@ _EVERY_ROW, _EVERY_COLUMN = 64, 2  # of the computed table that is stored
 _ROWS = 3201  # of a table of `value_iteration`
 
 
-@cache
-def _stored() -> NDArray[np.float16]:
-    """Returns the tables [G, D, 51, 41]."""
-    data = resources.files("keras_pendulum.diagnose") / "data" / "other_tasks.npz"
-    with np.load(io.BytesIO(data.read_bytes()), allow_pickle=False) as file:
-        tables: NDArray[np.float16] = file["values"]
-    return tables
-
-
 def other_value(gravity: float, discount: float) -> NDArray[np.float32]:
     """Returns V as a coarse table for `value_at` and `exact_q`.
 
+    It has 3201 rows, interpolated linearly between the stored ones.
+
     Args:
         gravity: one of GRAVITIES.
-        discount: one of DISCOUNTS, or 0.
+        discount: one of DISCOUNTS.
     """
-    if discount == 0:
-        return np.zeros((_ROWS, 2), np.float32)
-    index = GRAVITIES.index(gravity), DISCOUNTS.index(discount)
-    return expand_rows(_stored()[index].astype(np.float32))
-
-
-def expand_rows(table: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Returns a table with 3201 rows, interpolated linearly between the given rows."""
+    tables = _stored_tables()
+    table = tables[GRAVITIES.index(gravity), DISCOUNTS.index(discount)].astype(np.float32)
     position = np.linspace(0, len(table) - 1, _ROWS)
     low = np.minimum(position.astype(int), len(table) - 2)
     weight = (position - low)[:, None].astype(np.float32)
     return table[low] * (1 - weight) + table[low + 1] * weight
+
+
+@cache
+def _stored_tables() -> NDArray[np.float16]:
+    """Returns the tables [G, D, 51, 41]."""
+    data = resources.files("keras_pendulum.diagnosis") / "data" / "other_tasks.npz"
+    with np.load(io.BytesIO(data.read_bytes()), allow_pickle=False) as file:
+        tables: NDArray[np.float16] = file["values"]
+    return tables
 
 
 def _compute(gravity: float, discount: float) -> NDArray[np.float16]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from keras_pendulum.errors import one_line
 
 if TYPE_CHECKING:
-    from keras_pendulum.diagnose.diagnosis import Diagnosis
-    from keras_pendulum.diagnose.evidence import Finding
+    from keras_pendulum.diagnosis.diagnosis import Diagnosis
+    from keras_pendulum.diagnosis.faults import Finding
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 46rem; padding: 1rem;
@@ -24,8 +24,8 @@ dt { font-weight: 600; } dd { margin: 0 0 0.5rem 0; }
 
 def as_html(diagnosis: Diagnosis) -> str:
     """Returns the report. Every text from outside, such as the agent's name, is escaped."""
-    subject = diagnosis.measurement.subject
-    name = _text(subject.name)
+    measurement = diagnosis.measurement
+    name = _text(measurement.policy.name)
     parts = [
         "<!DOCTYPE html>",
         '<html lang="en"><head><meta charset="utf-8">',
@@ -33,8 +33,8 @@ def as_html(diagnosis: Diagnosis) -> str:
         f"<title>Diagnosis of {name}</title><style>{_STYLE}</style></head><body>",
         f"<h1>Diagnosis of {name}</h1>",
         f"<p><strong>{_text(diagnosis.verdict)}</strong></p>",
-        f"<p>Pendulum-v1, g = {subject.gravity:g}, γ = {subject.discount:g}. The best possible "
-        f"mean return is {diagnosis.measurement.optimum:.2f}.</p>",
+        f"<p>{measurement.task.name}, γ = {measurement.discount:g}. The best possible "
+        f"mean return is {measurement.optimum:.2f}.</p>",
         f'<img alt="Learned and exact values, repairs" src="{_image(diagnosis)}">',
     ]
     for number, finding in enumerate(diagnosis.findings, 1):
@@ -53,10 +53,8 @@ def _section(finding: Finding) -> str:
         "What to do": finding.remedy,
     }
     if finding.repair is not None:
-        repair = finding.repair
-        rows["Repair without training"] = f"{repair.name}: regret {repair.regret:.2f}"
-    if finding.cost is not None:
-        rows["Cost in return"] = f"{finding.cost:.1f}"
+        rows["Repair without training"] = str(finding.repair)
+        rows["Cost in return"] = f"{finding.repair.won:.1f}"
     rows["Read more"] = finding.page
     items = "".join(f"<dt>{_text(name)}</dt><dd>{_text(text)}</dd>" for name, text in rows.items())
     return f"<dl>{items}</dl>"

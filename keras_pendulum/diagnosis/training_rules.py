@@ -7,32 +7,33 @@ from __future__ import annotations
 
 import numpy as np
 
-from keras_pendulum.diagnose import repairs
-from keras_pendulum.diagnose.evidence import Evidence, Finding
+from keras_pendulum.diagnosis import repairs
+from keras_pendulum.diagnosis.faults import Finding
+from keras_pendulum.diagnosis.measurement import Measurement
 
 
-def stored_transitions(e: Evidence) -> Finding | None:
+def stored_transitions(m: Measurement) -> Finding | None:
     """Checks the stored transitions against the pendulum: a mismatch is a proof."""
-    r, m = e.record, e.measurement
-    torques = m.subject.torques
-    if r is None or torques is None or len(r.replay.action) < 200:
+    r, torques = m.record, m.torques
+    if r is None or len(r.replay.action) < 200:
         return None
     reward_correlation, reward_slope = r.reward_fit(torques)
     if reward_correlation < -0.9:
         return Finding("reward-sign", "stored rewards are the negative of the exact ones", "equal")
-    if r.terminal > 0.2:
-        evidence = f"{r.terminal:.0%} of the stored transitions end their episode"
+    terminal = r.replay.terminated.mean()
+    if terminal > 0.2:
+        evidence = f"{terminal:.0%} of the stored transitions end their episode"
         return Finding("no-bootstrapping", evidence, "none: the pendulum never terminates")
     gravity, torque_correlation = r.motion_fit(torques)
-    if torque_correlation < 0.9 and not e.lost_actions:
+    if torque_correlation < 0.9 and not r.lost_actions(torques):
         return Finding(
             "misaligned-transitions",
             f"correlation of the stored action with the torque that acted {torque_correlation:.2f}",
             "1.00",
         )
-    if abs(gravity - m.subject.gravity) > 0.3 * m.subject.gravity:
+    if abs(gravity - m.task.gravity) > 0.3 * m.task.gravity:
         evidence = f"stored transitions of a pendulum with g = {gravity:.2f}"
-        return Finding("other-gravity", evidence, f"{m.subject.gravity:.2f}")
+        return Finding("other-gravity", evidence, f"{m.task.gravity:.2f}")
     if reward_correlation > 0.999 and not 0.5 < reward_slope < 2:
         evidence = f"stored rewards {reward_slope:.3g} times the declared ones"
         return Finding("reward-scale", evidence, "1")
@@ -44,23 +45,23 @@ def stored_transitions(e: Evidence) -> Finding | None:
     return None
 
 
-def untrained_outputs(e: Evidence) -> Finding | None:
+def untrained_outputs(m: Measurement) -> Finding | None:
     """Finds outputs that are stored as others, never stored, or far from all others."""
-    m, lost = e.measurement, e.lost_actions
+    lost = [] if m.record is None else m.record.lost_actions(m.torques)
     if lost:
-        return e.repaired(
+        return Finding(
             "untrained-outputs",
             f"the outputs {', '.join(map(str, lost))} acted, but were stored as others",
             "each stored as itself",
             repairs.mask_outputs(m, lost),
         )
-    if e.record is not None and m.subject.torques is not None:
-        counts = e.record.action_counts(len(m.subject.torques))
+    if m.record is not None:
+        counts = np.bincount(m.record.replay.action, minlength=len(m.torques))
         missing = np.flatnonzero(counts == 0).tolist()
         # An output that is drawn at random λ times on average is missed with probability exp(-λ).
-        chance = e.record.random_count / len(counts) - np.log(len(counts))
+        chance = m.record.random_count / len(counts) - np.log(len(counts))
         if len(missing) < len(counts) / 2 and len(missing) * chance > 9:
-            return e.repaired(
+            return Finding(
                 "untrained-outputs",
                 f"no stored transition of the outputs {', '.join(map(str, missing))}",
                 "about the same number of each",
@@ -68,7 +69,7 @@ def untrained_outputs(e: Evidence) -> Finding | None:
             )
     odd = np.flatnonzero(m.outliers > max(10.0, 0.3 * m.outliers.max())).tolist()
     if odd and len(odd) <= len(m.outliers) / 4 and m.outliers.max() > 14:
-        return e.repaired(
+        return Finding(
             "untrained-outputs",
             f"mean error of the outputs {', '.join(map(str, odd))} {m.outliers.max():.0f} times "
             "the usual distance from the others",
@@ -78,9 +79,9 @@ def untrained_outputs(e: Evidence) -> Finding | None:
     return None
 
 
-def too_few_updates(e: Evidence) -> Finding | None:
+def too_few_updates(m: Measurement) -> Finding | None:
     """Finds values that have hardly left their initial size."""
-    m, r = e.measurement, e.record
+    r = m.record
     if r is not None and r.updates > 4000:
         return None
     largest = 0.35 if r is None else 0.75  # other faults leave small values, too
@@ -92,12 +93,12 @@ def too_few_updates(e: Evidence) -> Finding | None:
     return Finding("too-few-updates", evidence, "1.00, after some 10 000 updates")
 
 
-def exploration(e: Evidence) -> Finding | None:
+def exploration(m: Measurement) -> Finding | None:
     """Finds an ε that does not fall, or starts low."""
-    r = e.record
+    r = m.record
     if r is None or len(r.history) < 20:
         return None
-    epsilons = r.epsilons
+    epsilons = np.array([record.epsilon for record in r.history])
     last, first = epsilons[-len(epsilons) // 5 :].mean(), epsilons[: len(epsilons) // 5].mean()
     if last > 0.5:
         return Finding("exploration", f"ε of the last fifth {last:.2f}", "below 0.1")
@@ -106,9 +107,9 @@ def exploration(e: Evidence) -> Finding | None:
     return None
 
 
-def narrow_starts(e: Evidence) -> Finding | None:
+def narrow_starts(m: Measurement) -> Finding | None:
     """Finds a part of the plane that was never visited."""
-    m, r = e.measurement, e.record
+    r = m.record
     regions = m.regions
     if r is not None:
         seen = r.seen_cells()
@@ -125,66 +126,62 @@ def narrow_starts(e: Evidence) -> Finding | None:
     return None
 
 
-def forgetting(e: Evidence) -> Finding | None:
+def forgetting(m: Measurement) -> Finding | None:
     """Finds a replay buffer that holds a small part of the run."""
-    r = e.record
+    r = m.record
     if r is None:
         return None
     stored = len(r.replay.action)
     if r.steps >= 3 * stored and stored < 6000:
+        lower = (r.replay.observation[:, 0] < 0).mean()
         evidence = f"the buffer holds {stored} of {r.steps} transitions, "
-        evidence += f"{r.lower_half:.0%} of them in the lower half"
+        evidence += f"{lower:.0%} of them in the lower half"
         return Finding("forgetting", evidence, "14 000 or more, as `reference` has")
     return None
 
 
-def learning_rate(e: Evidence) -> Finding | None:
+def learning_rate(m: Measurement) -> Finding | None:
     """Finds a large recorded learning rate."""
-    if e.record is None:
+    if m.record is None:
         return None
-    rate, schedule = e.record.config.learning_rate, e.record.config.learning_rate_schedule
+    rate, schedule = m.record.config.learning_rate, m.record.config.learning_rate_schedule
     if rate < 5e-3 and (schedule != "constant" or rate < 2e-3):
         return None
-    saturated, dead = e.measurement.units
+    saturated, dead = m.units
     evidence = f"learning rate {rate:g}, {schedule}; {saturated:.0%} of a layer's tanh "
     evidence += f"units saturated, {dead:.0%} of the ReLU units dead"
     return Finding("learning-rate", evidence, "1e-3, falling to 0")
 
 
-def saturated_layer(e: Evidence) -> Finding | None:
+def saturated_layer(m: Measurement) -> Finding | None:
     """Finds the saturated layer that a large learning rate leaves."""
-    m = e.measurement
     saturated, dead = m.units
-    if e.record is None and (saturated > 0.93 or dead > 0.8) and m.value.correlation > 0.8:
-        share = max(saturated, dead)
-        return Finding(
-            "learning-rate", f"{share:.0%} of a layer's units saturated or dead", "below 85 %"
-        )
+    if m.record is None and (saturated > 0.93 or dead > 0.8) and m.value.correlation > 0.8:
+        evidence = f"{max(saturated, dead):.0%} of a layer's units saturated or dead"
+        return Finding("learning-rate", evidence, "below 85 %")
     return None
 
 
-def overestimation(e: Evidence) -> Finding | None:
+def overestimation(m: Measurement) -> Finding | None:
     """Finds values above the best possible ones, and above what the policy collects."""
-    m = e.measurement
     excess = m.excess
     if excess > 3:  # also where nothing else about the values is right
         evidence = f"the highest value is above the best possible by {excess:.1f} spreads"
         return Finding("overestimation", evidence, "0.00 to 0.15")
     # A policy collects less than its values promise for many reasons. This setting is one of them.
-    caused = e.record is not None and e.record.config.target_update == "none"
+    caused = m.record is not None and m.record.config.target_update == "none"
     right = m.value.correlation > 0.9 and m.value.slope > 0.5
-    if right and m.promise > (0.2 if caused else 0.5) and (caused or excess > 0.45):
+    if right and m.value_overestimate > (0.2 if caused else 0.5) and (caused or excess > 0.45):
         evidence = "the highest value of the visited states is above what the policy collects by "
-        evidence += f"{m.promise:.2f} spreads, above the best possible by {excess:.2f}"
+        evidence += f"{m.value_overestimate:.2f} spreads, above the best possible by {excess:.2f}"
         evidence += ", after a run without a target network" if caused else ""
         return Finding("overestimation", evidence, "up to 0.30, both")
     return None
 
 
-def misaligned(e: Evidence) -> Finding | None:
-    """Finds right values beside advantages that know nothing of the torque."""
-    m = e.measurement
-    if e.record is not None:  # the stored transitions have shown nothing
+def misaligned(m: Measurement) -> Finding | None:
+    """Finds right values beside advantages uncorrelated with the torque."""
+    if m.record is not None:  # the stored transitions have shown nothing
         return None
     if (
         max(m.units) < 0.9  # else the layers cannot show the torque, whatever was learned
@@ -200,12 +197,11 @@ def misaligned(e: Evidence) -> Finding | None:
     return None
 
 
-def undetermined(e: Evidence) -> Finding | None:
+def undetermined(m: Measurement) -> Finding | None:
     """Says that the values are wrong without a known reason."""
-    m = e.measurement
     right = m.value.correlation > 0.98 and 0.8 < m.value.slope < 1.25
     # A small regret of such a network is a matter of time.
-    if right and m.advantage.correlation > 0.5 and m.regret < 3 * m.little:
+    if right and m.advantage.correlation > 0.5 and m.regret < 3 * m.regret_tolerance:
         return None
     evidence = f"correlation of the values {m.value.correlation:.2f}, of the advantages "
     evidence += f"{m.advantage.correlation:.2f}"

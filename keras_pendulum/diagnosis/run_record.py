@@ -8,11 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.diagnose.signals import line_fit
-from keras_pendulum.diagnose.states import Array
+from keras_pendulum.diagnosis.signals import Array, line_fit
 from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.environments.pendulum import MAX_SPEED
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.optimum.dynamics import MAX_SPEED, TIME_STEP
+from keras_pendulum.optimum.dynamics import TIME_STEP
+from keras_pendulum.storage.recorded_run import load_recorded_run, load_transitions
+from keras_pendulum.storage.run_folder import RunFolder
+
+
+def read_record(folder: RunFolder) -> RunRecord:
+    """Returns settings, history and stored transitions of a run.
+
+    Raises WeightsError for a damaged checkpoint, and for one that holds weights without a run.
+    """
+    run = load_recorded_run(folder.weights)
+    return RunRecord(run.config, run.history, load_transitions(folder.weights))
 
 
 @dataclass(frozen=True)
@@ -34,20 +45,10 @@ class RunRecord:
         return self.history[-1].environment_steps if self.history else 0
 
     @property
-    def epsilons(self) -> Array:
-        """ε of each episode."""
-        return np.array([record.epsilon for record in self.history])
-
-    @property
     def states(self) -> Array:
         """The stored states [N, 2], θ in rad and θ̇ in rad/s."""
         cosine, sine, speed = self.replay.observation.astype(np.float64).T
         return np.stack([np.arctan2(sine, cosine), speed], axis=1)
-
-    @property
-    def lower_half(self) -> float:
-        """The share of the stored states with the pendulum below the horizontal."""
-        return float((self.replay.observation[:, 0] < 0).mean())
 
     def seen_cells(self, cells: int = 8) -> float:
         """Returns the share of the cells of the plane, up to 4 rad/s, with a stored state."""
@@ -56,10 +57,6 @@ class RunRecord:
         edges = [np.linspace(-np.pi, np.pi, cells + 1), np.linspace(-4, 4, cells + 1)]
         counts, *_ = np.histogram2d(theta, speed, bins=edges)
         return float((counts > 0).mean())
-
-    def action_counts(self, actions: int) -> NDArray[np.intp]:
-        """Returns how often each action is stored, [A]."""
-        return np.bincount(self.replay.action, minlength=actions)
 
     @property
     def random_count(self) -> float:
@@ -88,8 +85,11 @@ class RunRecord:
         """Returns the actions that acted, but were always stored as one other action.
 
         The equation of motion is exact, so each transition shows which torque acted in it. No
-        action is returned where the torques that acted are not among `torques`.
+        action is returned without 200 transitions, for half of the actions or more, and where the
+        torques that acted are not among `torques`.
         """
+        if len(self.replay.action) < 200:
+            return []
         sine, acceleration, stored = self._motion
         gravity, _ = self.motion_fit(torques)
         for _ in range(3):  # a lost action changes the first fit of the gravity a little
@@ -100,11 +100,12 @@ class RunRecord:
         if (np.abs(acted - torques[nearest]) < 0.01).mean() < 0.95:
             return []
         never_stored = set(nearest.tolist()) - set(self.replay.action.tolist())
-        return sorted(
+        lost = sorted(
             action
             for action in never_stored
             if (nearest == action).sum() > 1 and np.ptp(stored[nearest == action]) == 0
         )
+        return lost if len(lost) < len(torques) / 2 else []
 
     @property
     def _motion(self) -> tuple[Array, Array, NDArray[np.intp]]:
@@ -120,19 +121,16 @@ class RunRecord:
 
         Both are 1 in a healthy buffer, after division by the declared scale.
         """
-        theta, speed = self.states.T
-        exact = -(theta**2) - 0.1 * speed**2 - 0.001 * torques[self.replay.action] ** 2
-        fit = line_fit(self.replay.reward / self.config.reward_scale, exact)
+        rewards = self._exact_rewards(torques)
+        fit = line_fit(self.replay.reward / self.config.reward_scale, rewards)
         return fit.correlation, fit.slope
 
     def shifted_reward_fit(self, torques: Array) -> float:
         """Returns the correlation of the stored rewards with the exact ones of the step before."""
-        theta, speed = self.states.T
-        exact = -(theta**2) - 0.1 * speed**2 - 0.001 * torques[self.replay.action] ** 2
+        before = self._exact_rewards(torques)[:-1]
         same = np.all(self.replay.observation[1:] == self.replay.next_observation[:-1], axis=1)
-        return line_fit(self.replay.reward[1:][same], exact[:-1][same]).correlation
+        return line_fit(self.replay.reward[1:][same], before[same]).correlation
 
-    @property
-    def terminal(self) -> float:
-        """The share of the stored transitions that end their episode."""
-        return float(self.replay.terminated.mean())
+    def _exact_rewards(self, torques: Array) -> Array:
+        theta, speed = self.states.T
+        return -(theta**2) - 0.1 * speed**2 - 0.001 * torques[self.replay.action] ** 2

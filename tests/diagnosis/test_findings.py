@@ -1,54 +1,32 @@
+import json
 import re
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import coarse_value, exact_values, subject
+from exact_agent import NOISE, diagnose_values, exact_values, measure
 
-from keras_pendulum.diagnose import comparisons, measurement
-from keras_pendulum.diagnose.diagnosis import Diagnosis, diagnose_subject
-from keras_pendulum.diagnose.evidence import Evidence
-from keras_pendulum.diagnose.findings import RULES, find
-from keras_pendulum.diagnose.subject import Subject
-from keras_pendulum.diagnose.texts import TEXTS
-
-NOISE = np.random.RandomState(0).normal(size=(3, 41))
-
-
-@pytest.fixture(autouse=True)
-def _coarse_tables(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measurement, "discounted_value", coarse_value)
-    monkeypatch.setattr(comparisons, "other_value", coarse_value)
+from keras_pendulum.diagnosis.diagnosis import Diagnosis, diagnose_measurement
+from keras_pendulum.diagnosis.faults import FAULTS
+from keras_pendulum.diagnosis.findings import find
 
 
 def first(diagnosis: Diagnosis) -> str:
     return diagnosis.findings[0].name if diagnosis.findings else "no finding"
 
 
-def of(q_values: Any) -> str:
-    return first(diagnose_subject(subject(q_values)))
-
-
 def rewards(observations: Any) -> Any:
     return exact_values(observations, discount=0.0)
 
 
-def half(observations: Any) -> Any:
-    return exact_values(observations, discount=0.5)
-
-
-def with_outputs(*outputs: int) -> Any:
-    def q_values(observations: Any) -> Any:
-        q = 0.14 * exact_values(observations) - 1
-        q[:, list(outputs)] = 0.3
-        return q
-
-    return q_values
+def untrained_outputs(observations: Any) -> Any:
+    q = 0.14 * exact_values(observations) - 1
+    q[:, [2, 4]] = 0.3
+    return q
 
 
 def test_exact_values_give_no_finding() -> None:
-    diagnosis = diagnose_subject(subject(exact_values))
+    diagnosis = diagnose_values(exact_values)
     assert diagnosis.findings == diagnosis.notes == []
     assert diagnosis.summary().startswith("No finding: regret 0.")
     signals = diagnosis.as_json()["signals"]
@@ -68,7 +46,8 @@ def test_exact_values_give_no_finding() -> None:
         ("reward-sign", lambda o: -exact_values(o)),
         ("no-bootstrapping", rewards),
         ("misaligned-transitions", lambda o: 10 * rewards(o)),
-        ("untrained-outputs", with_outputs(2, 4)),
+        ("other-discount", lambda o: exact_values(o, discount=0.5)),
+        ("untrained-outputs", untrained_outputs),
         ("too-few-updates", lambda o: np.tanh(o @ NOISE) + 0.01 * exact_values(o)),
         ("reward-scale", lambda o: 1e-6 * np.tanh(o @ NOISE) + 1e-5 * exact_values(o)[:, :1]),
         ("broken-network", lambda o: np.full((len(o), 41), np.nan)),
@@ -79,7 +58,9 @@ def test_exact_values_give_no_finding() -> None:
     ],
 )
 def test_each_change_of_the_exact_values_is_named_first(fault: str, q_values: Any) -> None:
-    assert of(q_values) == fault
+    diagnosis = diagnose_values(q_values)
+    assert first(diagnosis) == fault
+    json.dumps(diagnosis.as_json(), allow_nan=False)
 
 
 @pytest.mark.parametrize(
@@ -90,34 +71,29 @@ def test_each_change_of_the_exact_values_is_named_first(fault: str, q_values: An
     ],
 )
 def test_right_values_need_more_training_unless_they_cost_much(share: float, verdict: str) -> None:
-    exact = subject(exact_values)
-    weak = replace(exact, act=lambda observations: share * exact.act(observations))
-    assert re.fullmatch(verdict, diagnose_subject(weak).verdict)
+    assert re.fullmatch(verdict, diagnose_values(exact_values, share=share).verdict)
 
 
 def test_values_of_another_gravity_are_named_with_it() -> None:
-    diagnosis = diagnose_subject(subject(exact_values, gravity=10.0))
+    diagnosis = diagnose_values(exact_values, gravity=10.0)
     assert first(diagnosis) == "other-gravity"
     assert "g = " in diagnosis.findings[0].evidence
 
 
-def test_values_of_another_discount_are_named() -> None:
-    found = diagnose_subject(subject(half))
-    assert "other-discount" in [each.name for each in (*found.findings, *found.notes)]
-
-
 @pytest.mark.parametrize(
-    ("fault", "q_values"),
+    ("note", "q_values"),
     [
-        ("reward-scale", lambda o: 5 * exact_values(o)),
-        ("torque-map", lambda o: exact_values(o)[:, 20 + (np.arange(41) - 20) // 4]),
+        ("reward-scale: values 5 times the exact ones", lambda o: 5 * exact_values(o)),
+        (
+            "torque-map: 41 outputs with 11 different values",
+            lambda o: exact_values(o)[:, 20 + (np.arange(41) - 20) // 4],
+        ),
     ],
 )
-def test_what_costs_little_is_a_note(fault: str, q_values: Any) -> None:
-    diagnosis = diagnose_subject(subject(q_values))
-    assert diagnosis.findings == []
-    assert [note.name for note in diagnosis.notes] == [fault]
-    assert f"Note, costs little: {fault}" in diagnosis.summary()
+def test_what_costs_little_is_a_note(note: str, q_values: Any) -> None:
+    diagnosis = diagnose_values(q_values)
+    assert diagnosis.findings == [] and len(diagnosis.notes) == 1
+    assert f"Note, costs little: {note}" in diagnosis.summary()
 
 
 def test_good_agent_has_no_note_whose_repair_makes_it_bad() -> None:
@@ -125,26 +101,24 @@ def test_good_agent_has_no_note_whose_repair_makes_it_bad() -> None:
         q = exact_values(observations, gravity=10.0, discount=0.98)
         return 0.25 * q + 0.75 * q.mean(axis=1, keepdims=True)
 
-    agent = subject(shrunk, gravity=10.0, discount=0.98)
-    (finding,) = find(Evidence(measurement.measure(agent), None))
+    measured = measure(shrunk, gravity=10.0, discount=0.98)
+    (finding,) = find(measured)
     assert (finding.name, finding.cost is not None and finding.cost < -100) == ("torque-map", True)
-    diagnosis = diagnose_subject(agent)
+    diagnosis = diagnose_measurement(measured)
     assert diagnosis.findings == diagnosis.notes == []
 
 
 def test_repair_shows_what_a_reversed_torque_map_costs() -> None:
-    finding = diagnose_subject(subject(lambda o: exact_values(o)[:, ::-1])).findings[0]
+    finding = diagnose_values(lambda o: exact_values(o)[:, ::-1]).findings[0]
     assert finding.repair is not None and finding.cost is not None
     assert finding.repair.regret < 2 and finding.cost > 500
 
 
 def test_bare_policy_is_diagnosed_by_repairs() -> None:
-    act = subject(exact_values).act
-    reversed_torque = Subject("policy", 1.0, 0.9, lambda observations: -act(observations))
-    diagnosis = diagnose_subject(reversed_torque)
+    diagnosis = diagnose_values(exact_values, share=-1.0, bare=True)
     assert first(diagnosis) == "torque-map"
     assert diagnosis.limits == ["the agent has no Q-values, so only repairs could be tried"]
-    assert first(diagnose_subject(Subject("policy", 1.0, 0.9, act))) == "no finding"
+    assert first(diagnose_values(exact_values, bare=True)) == "no finding"
 
 
 def test_wrong_values_without_a_known_reason_are_undetermined() -> None:
@@ -152,12 +126,12 @@ def test_wrong_values_without_a_known_reason_are_undetermined() -> None:
         q = exact_values(observations)
         return np.where(np.sin(20 * observations[:, :1]) > 0, q, q[:, ::-1])
 
-    diagnosis = diagnose_subject(subject(guesses))
+    diagnosis = diagnose_values(guesses)
     assert first(diagnosis) in ("undetermined", "misaligned-transitions")
     assert "run folder" in diagnosis.limits[0]
 
 
-def test_every_rule_has_a_text() -> None:
-    assert len(RULES) == len({rule.__name__ for rule in RULES})
-    for text in TEXTS.values():
-        assert text.explanation.count(". ") == 1 and text.remedy.endswith(".")
+def test_every_fault_has_two_sentences_and_a_remedy() -> None:
+    for fault in FAULTS.values():
+        assert fault.explanation.count(". ") == 1 and fault.remedy.endswith(".")
+        assert set(fault.explains) < set(FAULTS)

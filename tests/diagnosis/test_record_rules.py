@@ -5,27 +5,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import coarse_value, exact_values, subject
+from exact_agent import NOISE, exact_values, measure
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.diagnose import comparisons, measurement
-from keras_pendulum.diagnose.evidence import Evidence
-from keras_pendulum.diagnose.findings import find
-from keras_pendulum.diagnose.run_record import RunRecord
-from keras_pendulum.diagnose.states import Episodes, observe, plane_states
-from keras_pendulum.diagnose.task_rules import no_lookahead, observation_map, torque_map
-from keras_pendulum.diagnose.training_rules import overestimation
+from keras_pendulum.diagnosis.findings import find
+from keras_pendulum.diagnosis.run_record import RunRecord
+from keras_pendulum.diagnosis.states import Episodes, observe, plane_states
+from keras_pendulum.diagnosis.task_rules import no_lookahead, observation_map, torque_map
+from keras_pendulum.diagnosis.training_rules import overestimation
 from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
 
-NOISE = np.random.RandomState(0).normal(size=(3, 41))
 OTHER_NOISE = np.random.RandomState(1).normal(size=(3, 41))
-
-
-@pytest.fixture(autouse=True)
-def _coarse_tables(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measurement, "discounted_value", coarse_value)
-    monkeypatch.setattr(comparisons, "other_value", coarse_value)
 
 
 def untrained(observations: Any) -> Any:
@@ -47,27 +38,22 @@ def record_of(q_values: Any, **settings: Any) -> RunRecord:
     return RunRecord(replace(Config(), **settings), [], replay)
 
 
-def evidence(q_values: Any, record: RunRecord | None) -> Evidence:
-    return Evidence(measurement.measure(subject(q_values)), record)
-
-
 @pytest.mark.parametrize(
     "order",
     [np.arange(41)[::-1], np.roll(np.arange(41), 20), np.random.RandomState(3).permutation(41)],
 )
 def test_stored_actions_show_the_order_of_the_outputs(order: Any) -> None:
-    found = evidence(lambda o: untrained(o)[:, order], record_of(untrained))
+    found = measure(lambda o: untrained(o)[:, order], record_of(untrained))
     finding = torque_map(found)
     assert finding is not None and finding.evidence.endswith("in its place 1.00")
     assert finding.repair is not None
-    run = measurement.measure(subject(untrained))
-    assert finding.repair.regret == pytest.approx(run.regret, rel=0.1)
+    assert finding.repair.regret == pytest.approx(measure(untrained).regret, rel=0.1)
     assert observation_map(found) is None
 
 
 @pytest.mark.parametrize("signs", [(1, 1, -1), (-1, 1, 1), (1, -1, 1)])
 def test_stored_actions_show_the_changed_observation(signs: Any) -> None:
-    found = evidence(lambda o: untrained(o * np.array(signs)), record_of(untrained))
+    found = measure(lambda o: untrained(o * np.array(signs)), record_of(untrained))
     finding = observation_map(found)
     assert finding is not None and finding.evidence.endswith("1.00")
     assert torque_map(found) is None
@@ -75,7 +61,7 @@ def test_stored_actions_show_the_changed_observation(signs: Any) -> None:
 
 @pytest.mark.parametrize("q_values", [untrained, lambda o: np.sin(o @ OTHER_NOISE)])
 def test_agent_that_acts_as_its_run_or_as_no_map_of_it_has_no_map(q_values: Any) -> None:
-    found = evidence(q_values, record_of(untrained))
+    found = measure(q_values, record_of(untrained))
     assert torque_map(found) is None and observation_map(found) is None
 
 
@@ -83,15 +69,8 @@ def test_stored_actions_refute_a_torque_map() -> None:
     def reversed_values(observations: Any) -> Any:
         return exact_values(observations)[:, ::-1]
 
-    assert torque_map(evidence(reversed_values, None)) is not None
-    assert torque_map(evidence(reversed_values, record_of(reversed_values))) is None
-
-
-def test_equal_outputs_are_a_torque_map() -> None:
-    smaller = 20 + (np.arange(41) - 20) // 4
-    finding = torque_map(evidence(lambda o: untrained(o)[:, smaller], None))
-    assert finding is not None and finding.evidence == "41 outputs with 11 different values"
-    assert torque_map(evidence(untrained, None)) is None
+    assert torque_map(measure(reversed_values)) is not None
+    assert torque_map(measure(reversed_values, record_of(reversed_values))) is None
 
 
 def test_rewards_of_the_stored_states_are_no_bootstrapping() -> None:
@@ -103,27 +82,25 @@ def test_rewards_of_the_stored_states_are_no_bootstrapping() -> None:
         wrong = 20 * np.sin(9 * observations @ NOISE) * (observations[:, 2:] < 0)
         return exact_values(observations, discount=0.0) + wrong
 
-    finding = no_lookahead(evidence(rewards, replace(record, replay=replay)))
+    finding = no_lookahead(measure(rewards, replace(record, replay=replay)))
     assert finding is not None and finding.name == "no-bootstrapping"
-    assert no_lookahead(evidence(rewards, None)) is None
-    assert no_lookahead(evidence(exact_values, record)) is None
+    assert no_lookahead(measure(rewards)) is None
+    assert no_lookahead(measure(exact_values, record)) is None
 
 
 def test_uncollected_values_without_a_target_network_are_overestimation() -> None:
-    exact = subject(exact_values)
-    weak = replace(exact, act=lambda observations: 0 * exact.act(observations))
-    measured = measurement.measure(weak)
-    assert measured.excess == pytest.approx(0, abs=0.01) and measured.promise > 0.2
+    weak = measure(exact_values, share=0.0)
+    assert weak.excess == pytest.approx(0, abs=0.01) and weak.value_overestimate > 0.2
     without = record_of(exact_values, target_update="none")
-    assert overestimation(Evidence(measured, without)) is not None
-    assert overestimation(Evidence(measured, record_of(exact_values))) is None
-    assert overestimation(Evidence(measured)) is None
-    assert overestimation(evidence(exact_values, without)) is None
+    assert overestimation(measure(exact_values, without, share=0.0)) is not None
+    assert overestimation(measure(exact_values, record_of(exact_values), share=0.0)) is None
+    assert overestimation(weak) is None
+    assert overestimation(measure(exact_values, without)) is None
 
 
 def test_torque_map_explains_values_that_the_policy_does_not_collect() -> None:
     record = record_of(exact_values, target_update="none")
-    found = evidence(lambda o: exact_values(o)[:, ::-1], record)
+    found = measure(lambda o: exact_values(o)[:, ::-1], record)
     assert overestimation(found) is not None
     names = [finding.name for finding in find(found)]
     assert "torque-map" in names and "overestimation" not in names
@@ -131,7 +108,6 @@ def test_torque_map_explains_values_that_the_policy_does_not_collect() -> None:
 
 def test_returns_to_go_are_the_discounted_sums_of_the_rest() -> None:
     rewards = np.array([[1.0, 0], [2, 0], [4, 8]])
-    episodes = Episodes(np.zeros((3, 2, 2)), np.zeros((3, 2)), rewards)
+    episodes = Episodes(np.zeros((3, 2, 2)), rewards)
     assert episodes.returns_to_go(0.5).tolist() == [[3, 2], [4, 4], [4, 8]]
-    assert episodes.discounted(0.5).tolist() == [3, 2]
     assert rewards[0, 0] == 1

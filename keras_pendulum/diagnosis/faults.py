@@ -1,0 +1,169 @@
+"""The faults that a diagnosis can name, in words, and a finding: a fault that is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+
+class Fault(NamedTuple):
+    """What a fault is, why it hurts, and what to do."""
+
+    explanation: str  # two sentences
+    remedy: str
+    explains: tuple[str, ...] = ()  # other faults: what shows them is a trace of this one
+
+
+# `findings.find` leaves out what a fault explains in this order.
+FAULTS: dict[str, Fault] = {
+    "reward-sign": Fault(
+        "The learned values are high where the exact values are low. The agent learned to collect "
+        "costs.",
+        "Check the sign of the reward where it is stored: the pendulum's reward is never positive.",
+        ("observation-map", "overestimation"),
+    ),
+    "no-bootstrapping": Fault(
+        "The values are the rewards of one step. The agent does not look ahead, so it cannot swing "
+        "the pendulum up.",
+        "Add γ·max Q(next) to each target; the pendulum never terminates, truncation is no end.",
+        ("too-few-updates", "reward-scale", "other-discount"),
+    ),
+    "other-discount": Fault(
+        "The values fit another discount much better than the declared one. The agent looks ahead "
+        "over another number of steps.",
+        "Check the γ of the TD target against the one that you declare.",
+        ("too-few-updates", "reward-scale"),
+    ),
+    "reward-scale": Fault(
+        "The values are those of rewards with another size. Large rewards need larger outputs than "
+        "the network reaches in time, and small ones are lost in the noise of its initial weights.",
+        "Scale the rewards so that the values are between 1 and 100 in size.",
+        ("too-few-updates",),
+    ),
+    "untrained-outputs": Fault(
+        "A few outputs differ from all others in every state, and the maximum picks them. They "
+        "were never learned, so they still have their initial values, and every target uses them.",
+        "Count the stored actions by index: each index must occur.",
+        ("too-few-updates", "no-bootstrapping"),
+    ),
+    "observation-map": Fault(
+        "The values fit the exact ones as soon as the observation is changed. So the agent sees "
+        "another observation when it acts than when it learned.",
+        "Give the agent [cos θ, sin θ, θ̇] in this order, with θ̇ in rad/s, in training and after.",
+        ("too-few-updates", "narrow-starts", "other-gravity", "other-discount", "overestimation"),
+    ),
+    "torque-map": Fault(
+        "The values are right, but each output behaves like another torque than the one it stands "
+        "for. So an index means another torque when acting than when learning.",
+        "Use one table from index to torque for acting and for storing; store the index itself.",
+        ("overestimation",),
+    ),
+    "too-few-updates": Fault(
+        "The values have hardly left their initial size. Each update carries a reward back by one "
+        "step, so the values of the swing-up need thousands of updates.",
+        "Make more updates for each step of the environment, up to one for each step.",
+        ("narrow-starts",),
+    ),
+    "misaligned-transitions": Fault(
+        "The values have no use for the torque, or a stored transition is one that the pendulum "
+        "cannot make. So observation, action, reward and next observation are of different steps.",
+        "Store (s, a, r, s') of one step; copy the observation before the environment changes it.",
+        ("too-few-updates",),
+    ),
+    "broken-network": Fault(
+        "The outputs are not numbers, have no sensible size, or are the same for all actions. Such "
+        "a network cannot choose an action, and more training does not repair it.",
+        "Start again with a smaller learning rate, scaled observations and rewards, and a clipped "
+        "gradient.",
+        ("too-few-updates", "no-bootstrapping", "narrow-starts"),
+    ),
+    "other-gravity": Fault(
+        "The values fit another gravity much better than the declared one. The agent learned a "
+        "different pendulum.",
+        "Train at the gravity at which you evaluate, or declare the one of the training.",
+    ),
+    "overestimation": Fault(
+        "The network promises more than its policy collects. The maximum of noisy values is too "
+        "high, and each target passes the error on.",
+        "Use a target network, double Q-learning and a replay buffer of many episodes.",
+    ),
+    "narrow-starts": Fault(
+        "The values are right in a part of the plane and wrong in the rest. The agent has never "
+        "been in the rest.",
+        "Start the episodes all over the plane, and let them last long enough to leave the start.",
+    ),
+    "forgetting": Fault(
+        "The replay buffer holds the last episodes only. What the network learned about the way "
+        "up is overwritten when no stored transition shows it.",
+        "Make the replay buffer larger: it should hold at least 14 000 transitions.",
+    ),
+    "exploration": Fault(
+        "The share of random actions does not fall, or has fallen before the values were known. So "
+        "the stored transitions do not show what good actions lead to.",
+        "Let ε fall from about 0.9 to 0.01 over the first half of the run.",
+    ),
+    "learning-rate": Fault(
+        "The values change from update to update more than actions differ. The policy is still "
+        "jumping at the end of the run.",
+        "Make the learning rate smaller, and let it fall to 0 at the end.",
+    ),
+    "undetermined": Fault(
+        "The values are wrong, but no single fault explains how. Several faults of the training "
+        "leave the same network behind.",
+        "Diagnose the run folder instead of the network: its history and replay buffer tell more.",
+    ),
+}
+
+
+class Repair(NamedTuple):
+    """A change of the agent without training."""
+
+    name: str
+    regret: float  # with the change
+    won: float  # in return
+
+    def __str__(self) -> str:
+        return f"{self.name}: regret {self.regret:.2f}"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A fault that the evidence shows."""
+
+    name: str
+    evidence: str
+    healthy: str  # the same figure of a healthy network
+    repair: Repair | None = None  # where there is one
+
+    @property
+    def cost(self) -> float | None:
+        """What the fault costs in return, where a repair shows it."""
+        return None if self.repair is None else self.repair.won
+
+    @property
+    def explanation(self) -> str:
+        """Two sentences on the fault."""
+        return FAULTS[self.name].explanation
+
+    @property
+    def remedy(self) -> str:
+        """What to do."""
+        return FAULTS[self.name].remedy
+
+    @property
+    def page(self) -> str:
+        """The section of the docs."""
+        return f"docs/diagnose.md#{self.name}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Returns the finding as an object of JSON."""
+        return {
+            "name": self.name,
+            "evidence": self.evidence,
+            "healthy": self.healthy,
+            "cost": self.cost,
+            "repair": self.repair.name if self.repair else None,
+            "explanation": self.explanation,
+            "remedy": self.remedy,
+            "page": self.page,
+        }

@@ -1,0 +1,155 @@
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from exact_agent import NOISE, diagnose_values, exact_values
+
+import keras_pendulum as kp
+from keras_pendulum.diagnosis.run_record import RunRecord, read_record
+from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.errors import WeightsError
+from keras_pendulum.optimum.dynamics import TORQUES
+from keras_pendulum.storage.run_folder import find_run
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    folder = tmp_path_factory.mktemp("run")
+    kp.train_dqn(kp.preset("reference", episodes=30, hidden_units=(8, 8)), folder)
+    return read_record(find_run(folder))
+
+
+def changed(record: RunRecord, **fields: Any) -> RunRecord:
+    return replace(record, replay=record.replay._replace(**fields))
+
+
+def selected(record: RunRecord, rows: Any) -> RunRecord:
+    return replace(record, replay=Transitions(*(array[rows] for array in record.replay)))
+
+
+def stored_as(record: RunRecord, action: int, other: int) -> RunRecord:
+    stored = record.replay.action
+    return changed(record, action=np.where(stored == action, other, stored))
+
+
+def trained(record: RunRecord, decay: float) -> RunRecord:
+    """Returns the record of a run with enough updates, whose ε falls by a factor an episode."""
+    history = [
+        each._replace(epsilon=0.9 * decay**index, updates=9000)
+        for index, each in enumerate(record.history)
+    ]
+    return replace(record, history=history)
+
+
+def useless(observations: Any) -> Any:
+    return exact_values(observations) * np.sin(20 * observations[:, :1])
+
+
+def first(record: RunRecord) -> str:
+    """Returns the first finding on a useless agent with this record."""
+    return diagnose_values(useless, record).findings[0].name
+
+
+def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> None:
+    assert record.motion_fit(TORQUES) == pytest.approx((1, 1), abs=0.01)
+    assert record.reward_fit(TORQUES) == pytest.approx((1, 1), abs=1e-4)
+    assert record.shifted_reward_fit(TORQUES) < 0.9999
+    assert not record.replay.terminated.any()
+    assert record.steps == len(record.replay.action) == 30 * record.config.max_episode_steps
+
+
+def test_declared_reward_scale_is_no_fault(record: RunRecord) -> None:
+    scaled = changed(record, reward=50 * record.replay.reward)
+    scaled = replace(scaled, config=replace(record.config, reward_scale=50.0))
+    assert scaled.reward_fit(TORQUES)[1] == pytest.approx(1, abs=1e-4)
+
+
+def before(record: RunRecord, field: str) -> RunRecord:
+    return changed(record, **{field: np.roll(getattr(record.replay, field), 1, axis=0)})
+
+
+@pytest.mark.parametrize(
+    ("fault", "change"),
+    [
+        ("reward-sign", lambda r: changed(r, reward=-r.replay.reward)),
+        ("reward-scale", lambda r: changed(r, reward=50 * r.replay.reward)),
+        ("no-bootstrapping", lambda r: changed(r, terminated=np.ones_like(r.replay.terminated))),
+        ("misaligned-transitions", lambda r: before(r, "action")),
+        ("misaligned-transitions", lambda r: before(r, "next_observation")),
+        ("misaligned-transitions", lambda r: before(r, "reward")),
+        ("untrained-outputs", lambda r: selected(r, r.replay.action != 7)),
+        ("exploration", lambda r: trained(r, 1.0)),
+        ("forgetting", lambda r: trained(selected(r, slice(-1000, None)), 0.8)),
+    ],
+)
+def test_changed_record_is_named(fault: str, change: Any, record: RunRecord) -> None:
+    assert first(change(record)) == fault
+
+
+@pytest.mark.parametrize(("action", "other"), [(3, 4), (39, 40), (0, 40)])
+def test_action_stored_as_another_is_lost(record: RunRecord, action: int, other: int) -> None:
+    assert record.lost_actions(TORQUES) == []
+    assert stored_as(record, action, other).lost_actions(TORQUES) == [action]
+    assert first(stored_as(record, action, other)) == "untrained-outputs"
+
+
+def test_lost_action_is_proven_in_a_small_buffer_of_one_action(record: RunRecord) -> None:
+    rows = np.flatnonzero(record.replay.action == 39)  # the correlation of a constant is 0
+    small = stored_as(selected(record, np.resize(rows, 300)), 39, 40)
+    assert first(small) == "untrained-outputs"
+
+
+def test_torques_between_the_outputs_lose_no_action(record: RunRecord) -> None:
+    kept = selected(record, record.replay.action < 40)
+    following = kept.replay.next_observation + np.array([0, 0, 0.01], np.float32)
+    following[::2, 2] -= 0.02
+    assert changed(kept, next_observation=following).lost_actions(TORQUES) == []
+
+
+@pytest.mark.parametrize("stored", [240, 1000])
+def test_transitions_off_by_one_lose_no_action(record: RunRecord, stored: int) -> None:
+    last = selected(record, slice(-stored, None))
+    shifted = changed(last, action=np.roll(last.replay.action, 1))
+    assert shifted.lost_actions(TORQUES) == []
+
+
+def test_another_gravity_of_the_stored_transitions_is_named(record: RunRecord) -> None:
+    finding = diagnose_values(useless, record, gravity=10.0).findings[0]
+    assert finding.name == "other-gravity"
+    assert finding.evidence == "stored transitions of a pendulum with g = 1.00"
+
+
+def test_stored_transitions_exclude_another_gravity(record: RunRecord) -> None:
+    def two(observations: Any) -> Any:
+        return exact_values(observations, gravity=2.0)
+
+    assert diagnose_values(two).notes[0].name == "other-gravity"
+    diagnosis = diagnose_values(two, record)
+    assert "other-gravity" not in [each.name for each in diagnosis.findings + diagnosis.notes]
+
+
+def test_few_recorded_updates_explain_small_values(record: RunRecord) -> None:
+    def noisy(observations: Any) -> Any:
+        value = exact_values(observations).mean(axis=1)[:, None]
+        return 0.5 * value + np.sin(9 * observations @ NOISE)
+
+    history = [each._replace(updates=500) for each in record.history]
+    assert diagnose_values(noisy).findings[0].name != "too-few-updates"
+    found = diagnose_values(noisy, replace(record, history=history)).findings
+    assert found[0].name == "too-few-updates"
+    assert found[0].evidence.endswith("after 500 updates")
+
+
+def test_recorded_learning_rate_is_named_beside_another_fault(record: RunRecord) -> None:
+    large = replace(record, config=replace(record.config, learning_rate=0.05))
+    terminal = changed(large, terminated=np.ones_like(record.replay.terminated))
+    names = [finding.name for finding in diagnose_values(useless, terminal).findings]
+    assert names[:2] == ["no-bootstrapping", "learning-rate"]
+
+
+def test_weights_without_a_run_are_refused(tmp_path: Path) -> None:
+    kp.save_weights(kp.DQN((8,)), tmp_path / "pendulum_weight.h5")
+    with pytest.raises(WeightsError, match="without a run"):
+        read_record(find_run(tmp_path))
