@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
-from keras_pendulum.compare.folders import short_names
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.fields import format_value
 from keras_pendulum.config.presets import PRESETS
-from keras_pendulum.environments.tasks import TASKS, task_name
 from keras_pendulum.errors import UserError
-from keras_pendulum.evaluate.evaluation import evaluate_policy, optimal_training_return
+from keras_pendulum.evaluate.evaluation import evaluate_policy
 from keras_pendulum.evaluate.score import Score
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.storage.weights import load_weights
-from keras_pendulum.train.checkpoint import load_history
+from keras_pendulum.optimum.solutions import solution
+from keras_pendulum.storage.load_weights import load_weights
+from keras_pendulum.storage.recorded_run import load_recorded_run
+from keras_pendulum.storage.run_folder import RunFolder
 
 
 @dataclass(frozen=True)
@@ -32,70 +34,62 @@ class ComparedRun:
     @property
     def changed_settings(self) -> str:
         """The settings that differ from the preset's, such as `discount=0.95 tau=0.01`."""
-        preset = PRESETS.get(self.config.preset, Config())
-        changes = {
-            spec.name: getattr(self.config, spec.name)
-            for spec in fields(Config)
-            if getattr(self.config, spec.name) != getattr(preset, spec.name)
-        }
-        # These have a column of their own, or change nothing.
-        for name in (
-            *("preset", "seed", "episodes"),
-            *("save_every", "evaluate_every", "keep_best", "snapshots"),
-        ):
-            changes.pop(name, None)
-        return " ".join(f"{name}={format_value(value)}" for name, value in changes.items())
+        preset = PRESETS.get(self.config.preset, Config()).learning()
+        own_columns = ("preset", "seed", "episodes")
+        return " ".join(
+            f"{name}={format_value(value)}"
+            for name, value in self.config.learning().items()
+            if value != preset[name] and name not in own_columns
+        )
 
 
-def load_runs(folders: Sequence[str], checkpoints: Sequence[Path]) -> list[ComparedRun]:
-    """Returns the runs in these checkpoints, in the same order, with their policies evaluated.
-
-    Args:
-        folders: the folders as the user typed them.
-        checkpoints: the checkpoint in each.
+def load_runs(folders: Sequence[RunFolder]) -> list[ComparedRun]:
+    """Returns the runs in these folders, in the same order, with their policies evaluated.
 
     Raises UserError for a run of another task than the first one's, and for a damaged one.
     """
-    runs = [load_history(file) for file in checkpoints]
-    _require_one_task(folders, [config for config, _ in runs])
-    for folder, (_, history) in zip(folders, runs, strict=True):
-        if not history:
-            raise UserError(f"{folder}: its run has no finished episode yet")
-        if not all(
-            math.isfinite(record.average_reward + record.episode_return) for record in history
-        ):
-            raise UserError(f"{folder}: its history is damaged, a return is not finite")
-    scores = [evaluate_policy(load_weights(file)) for file in checkpoints]
-    return [
-        ComparedRun(name, *run, score)
-        for name, run, score in zip(short_names(folders), runs, scores, strict=True)
-    ]
-
-
-def _require_one_task(folders: Sequence[str], configs: Sequence[Config]) -> None:
-    tasks = [task_name(config.environment, config.gravity) for config in configs]
+    runs = [load_recorded_run(folder.weights) for folder in folders]
+    tasks = [run.config.task.name for run in runs]
     others = [
-        f"{folder} ({task})"
+        f"{folder.path} ({task})"
         for folder, task in zip(folders, tasks, strict=True)
         if task != tasks[0]
     ]
     if others:
         raise UserError(
-            f"{', '.join(others)}: another task than that of {folders[0]} ({tasks[0]}); regrets of "
-            "different tasks cannot be compared"
+            f"{', '.join(others)}: another task than that of {folders[0].path} ({tasks[0]}); "
+            "regrets of different tasks cannot be compared"
         )
+    for folder, run in zip(folders, runs, strict=True):
+        if not run.history:
+            raise UserError(f"{folder.path}: its run has no finished episode yet")
+        if not all(
+            math.isfinite(record.average_reward + record.episode_return) for record in run.history
+        ):
+            raise UserError(f"{folder.path}: its history is damaged, a return is not finite")
+    scores = [evaluate_policy(load_weights(folder.weights)) for folder in folders]
+    names = short_names([folder.path for folder in folders])
+    return [
+        ComparedRun(name, run.config, run.history, score)
+        for name, run, score in zip(names, runs, scores, strict=True)
+    ]
+
+
+def short_names(folders: Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Returns the names of different folders, with as many parents as make the names different."""
+    paths = [Path(os.path.realpath(folder)).parts for folder in folders]
+    names = (["/".join(parts[-length:]) for parts in paths] for length in count(1))
+    return next(each for each in names if len(set(each)) == len(paths))
 
 
 def best_possible(runs: Sequence[ComparedRun]) -> float | None:
     """Returns the optimum of a training episode, on the scale of the learning curves.
 
-    For the pendulum it is the average reward per step, for CartPole the return. It is None where
-    the runs have episodes of different lengths, or longer ones than Gymnasium's.
+    It is None where the runs have episodes of different lengths, or longer ones than Gymnasium's.
     """
     if len({run.config.max_episode_steps for run in runs}) > 1:
         return None
     config = runs[0].config
-    optimum = optimal_training_return(config)
-    if TASKS[config.environment].never_terminates:
-        optimum /= config.max_episode_steps
-    return None if math.isnan(optimum) else optimum
+    steps = config.max_episode_steps
+    optimum = solution(config.task).mean_best_return(steps)
+    return None if math.isnan(optimum) else config.task.curve_value(optimum, steps)

@@ -62,15 +62,16 @@ def _write(arguments: argparse.Namespace) -> int:
 
     with fast_import():
         from keras_pendulum.page.build import build_page
-        from keras_pendulum.page.training import find_checkpoint, training_content
+        from keras_pendulum.page.training import training_content
         from keras_pendulum.storage.find_weights import find_weights
-        from keras_pendulum.storage.weights import load_weights
+        from keras_pendulum.storage.load_weights import load_weights
+        from keras_pendulum.storage.run_folder import find_run_if_folder
 
-    checkpoint = find_checkpoint(arguments.weights)
-    path = checkpoint or find_weights(arguments.weights)
+    run = find_run_if_folder(arguments.weights)
+    path = run.weights if run else find_weights(arguments.weights)
     network, against = load_weights(path, arguments.activation), None
-    training = training_content(checkpoint, network) if checkpoint else None
-    name = path.resolve().parent.name if checkpoint else None
+    training = training_content(run, network) if run else None
+    name = path.resolve().parent.name if run else None
     if arguments.against is not None:
         other = find_weights(arguments.against)
         against = (load_weights(other), other)
@@ -78,7 +79,7 @@ def _write(arguments: argparse.Namespace) -> int:
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")
-    if checkpoint and not training:
+    if run and not training:
         print("There is no slider: the run has no snapshots (train --snapshots 20 keeps them)")
     if arguments.open and not webbrowser.open(address):
         raise UserError(f"the browser did not start: open {out} yourself")

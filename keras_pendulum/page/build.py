@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 import json
-import math
 import re
 from functools import cache
 from importlib import resources
@@ -16,12 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from keras_pendulum.dqn.network import DQN, Provenance
-from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import UserError
-from keras_pendulum.evaluate.evaluation import evaluation_gravity
+from keras_pendulum.dqn.network import DQN
+from keras_pendulum.environments.pendulum import Pendulum, require_pendulum
 from keras_pendulum.optimum.value_iteration import solve
-from keras_pendulum.storage.weights import recorded_return
+from keras_pendulum.storage.load_weights import recorded_return
+from keras_pendulum.storage.run_info import RunInfo
 from keras_pendulum.version import __version__
 
 _WEB = resources.files("keras_pendulum.page") / "web"
@@ -49,14 +47,14 @@ def build_page(
         training: the `training_content` of the network's run.
         name: the name of the network on the page; None takes that of the file.
 
-    Raises ConfigError for a gravity out of range, and UserError for a network of CartPole.
+    Raises ConfigError for a gravity out of range, and for a network of CartPole.
     """
     gravity = _gravity(network, path, gravity)
     content = _network_content(network, path, gravity) | {
         "version": __version__,
         "against": None,
         "training": training,
-        "optimum": _optimum_content(gravity),
+        "optimum": _optimum_content(gravity, THETA_CELLS),
     }
     if name is not None:
         content["name"] = name
@@ -67,36 +65,33 @@ def build_page(
 
 
 def _gravity(network: DQN, path: Path, gravity: float | None) -> float:
-    """Returns the gravity of the page. Raises UserError for a network of CartPole."""
-    provenance = network.provenance
-    if not TASKS[provenance.environment].has_torque:
-        raise UserError(f"{path}: belongs to {provenance.environment}; the page shows Pendulum-v1")
-    found = evaluation_gravity(provenance, gravity)
-    assert found is not None  # only CartPole has none
-    return found
+    """Returns the gravity of the page. Raises ConfigError for a network of CartPole."""
+    task = RunInfo.from_record(network.metadata).task or Pendulum()
+    task = require_pendulum(task, f"{path}:", "the page shows Pendulum-v1")
+    return task.with_gravity(gravity).gravity
 
 
 def _network_content(network: DQN, path: Path, gravity: float) -> dict[str, Any]:
     """Returns what the page knows of a network."""
-    provenance = network.provenance
+    info = RunInfo.from_record(network.metadata)
     weights = b"".join(array.astype("<f4").tobytes() for array in network.get_weights())
     return {
         "name": path.name,
-        "preset": None if provenance.preset is None else str(provenance.preset),
+        "preset": info.preset,
         "gravity": gravity,
-        "trainedGravity": provenance.gravity,
+        "trainedGravity": info.task.gravity if info.task else None,
         "evaluatedReturn": recorded_return(path),
         "sizes": [network.observation_size, *network.hidden_units, network.action_count],
         "activation": network.activation,
-        "rewardScale": _reward_scale(provenance),
+        "rewardScale": info.reward_scale,
         "weights": base64.b64encode(weights).decode(),
     }
 
 
 @cache
-def _optimum_content(gravity: float) -> dict[str, Any]:
+def _optimum_content(gravity: float, cells: int) -> dict[str, Any]:
     """Returns the table of the optimal value of 200 steps; uint16 of its root, which is precise."""
-    roots = np.sqrt(-solve(gravity, theta_cells=THETA_CELLS)[::SPEED_STRIDE])
+    roots = np.sqrt(-solve(gravity, theta_cells=cells)[::SPEED_STRIDE])
     scale = float(roots.max()) / np.iinfo(np.uint16).max
     table = np.rint(roots / scale).astype("<u2")
     rows, columns = table.shape
@@ -106,15 +101,6 @@ def _optimum_content(gravity: float) -> dict[str, Any]:
         "scale": scale,
         "table": base64.b64encode(table.tobytes()).decode(),
     }
-
-
-def _reward_scale(provenance: Provenance) -> float:
-    """Returns the factor on the rewards of the recorded run; 1 if the file records none."""
-    try:
-        scale = float(json.loads(provenance.config or "{}")["reward_scale"])
-    except (ValueError, TypeError, KeyError, OverflowError):
-        return 1.0
-    return scale if math.isfinite(scale) and scale > 0 else 1.0
 
 
 def _fill(content: dict[str, Any]) -> str:

@@ -10,53 +10,40 @@ snapshot's own, in float16.
 from __future__ import annotations
 
 import base64
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.storage.quarantine import open_h5
-from keras_pendulum.storage.run_history import read_history
-from keras_pendulum.storage.snapshots import read_snapshots, snapshots_file
+from keras_pendulum.figures.learning_curve import trailing_mean
+from keras_pendulum.storage.recorded_run import load_recorded_run
+from keras_pendulum.storage.run_folder import RunFolder
+from keras_pendulum.storage.snapshots import read_snapshots
 
 _BASE64 = np.frombuffer(
     b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/", np.uint8
 )
 _ZERO, _LARGEST = 2048, 2047  # of the 12 bits
-_MEAN_OVER = 10  # episodes, as in rewards.png
 _MOST_POINTS = 500  # of the learning curve
 
 
-def find_checkpoint(folder: str | os.PathLike[str]) -> Path | None:
-    """Returns the checkpoint in the folder of a run, None for anything else."""
-    files = [Path(folder) / task.weights_name for task in TASKS.values()]
-    try:
-        return next((file for file in files if file.is_file()), None)
-    except OSError:  # a name that no file can have
-        return None
-
-
-def training_content(checkpoint: Path, network: DQN) -> dict[str, Any] | None:
+def training_content(folder: RunFolder, network: DQN) -> dict[str, Any] | None:
     """Returns the training of a run; None where the run has no snapshots.
 
     Args:
-        checkpoint: of the run.
-        network: the network in it. It is the last one of the training.
+        folder: of the run.
+        network: the network in its checkpoint. It is the last one of the training.
 
     Raises WeightsError when the snapshots are damaged or belong to another run.
     """
-    file = snapshots_file(checkpoint)
-    if not file.exists():
+    if not folder.snapshots.exists():
         return None
-    with open_h5(checkpoint) as content:
-        history = read_history(content)
+    history = load_recorded_run(folder.weights).history
+    snapshots = read_snapshots(folder.snapshots, network, history)
     # After the last episode, the exact network replaces its snapshot.
-    before = [each for each in read_snapshots(file, network, history) if each[0] < len(history)]
+    before = [each for each in snapshots if each.episodes < len(history)]
     if not before:
         return None
     shapes = [array.shape for array in network.get_weights()]
@@ -69,10 +56,8 @@ def training_content(checkpoint: Path, network: DQN) -> dict[str, Any] | None:
 
 def _curve(rewards: Sequence[float]) -> list[float]:
     """Returns evenly spaced points of the trailing mean, the first and the last one included."""
-    sums = np.cumsum([0.0, *rewards])
     ends = np.linspace(1, len(rewards), min(len(rewards), _MOST_POINTS)).round().astype(int)
-    starts = np.maximum(ends - _MEAN_OVER, 0)
-    return [float(f"{value:.4g}") for value in (sums[ends] - sums[starts]) / (ends - starts)]
+    return [float(f"{value:.4g}") for value in trailing_mean(rewards)[ends - 1]]
 
 
 def _encode(weights: NDArray[np.float16], shapes: Sequence[tuple[int, ...]]) -> dict[str, str]:

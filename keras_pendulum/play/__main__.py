@@ -7,22 +7,15 @@ import argparse
 import functools
 import random
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from keras_pendulum.cli import (
-    ControlC,
-    OneLineParser,
-    add_activation_flag,
-    nonempty_path,
-    run_command,
-)
+from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
 from keras_pendulum.completion import complete_with, weights_files
-from keras_pendulum.config.config import Config
 from keras_pendulum.config.settings import validate_setting
 from keras_pendulum.display import require_display
-from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import UserError
+from keras_pendulum.environments.pendulum import Pendulum, require_pendulum
+from keras_pendulum.play.control_c import control_c
 from keras_pendulum.storage.find_weights import find_weights
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
@@ -30,7 +23,7 @@ from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from keras_pendulum.play.episode import Policy
+    from keras_pendulum.evaluate.policy import Policy
     from keras_pendulum.play.window import Window
 
 
@@ -62,65 +55,55 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 def _play(arguments: argparse.Namespace) -> int:
     gravity, seed = arguments.gravity, arguments.seed
-    if gravity is not None:
-        gravity = validate_setting("gravity", gravity)
+    task = Pendulum().with_gravity(gravity)
     if seed is not None:
         seed = validate_setting("seed", seed)
     file = find_weights(arguments.against) if arguments.against is not None else None
     require_display()
     from keras_pendulum.play.window import Window
 
-    with ControlC() as control_c:
+    with control_c() as check_control_c:
         window = Window()
         try:
-            agent = None
+            policy = None
             if file is not None:
                 window.show_loading(f"Loading the policy of {file.name} …")
-                agent, gravity = _load_agent(file, gravity, arguments.activation)
-            elif gravity is None:
-                gravity = Config.gravity
-            assert gravity is not None  # only CartPole has none
-            return _run_game(window, control_c, gravity, seed, agent, arguments.print_steps)
+                policy = _load_policy(file, arguments.activation)
+                task = require_pendulum(policy.task, f"{file}:").with_gravity(gravity)
+            return _run_game(window, check_control_c, task, seed, policy, arguments.print_steps)
         finally:
             window.close()
 
 
-def _load_agent(file: Path, gravity: float | None, activation: str | None) -> tuple[Policy, float]:
-    """Returns the greedy policy of a weights file, and the gravity to play at (m/s²)."""
+def _load_policy(file: Path, activation: str | None) -> Policy:
+    """Returns the greedy policy of a weights file."""
     require_tensorflow()
     with fast_import():
-        from keras_pendulum.evaluate.evaluation import evaluation_gravity
-        from keras_pendulum.evaluate.loaded_policy import load_policy
+        from keras_pendulum.evaluate.sources import load_policy
 
-    policy = load_policy(file, activation)
-    provenance = policy.provenance
-    if not TASKS[provenance.environment].has_torque:
-        raise UserError(f"{file}: belongs to {provenance.environment}; expected Pendulum-v1")
-    gravity = evaluation_gravity(provenance, gravity)
-    assert gravity is not None  # only CartPole has none
-    return lambda observation: float(policy(observation)[0]), gravity
+    return load_policy(file, activation)
 
 
 def _run_game(
     window: Window,
-    control_c: ControlC,
-    gravity: float,
+    check_control_c: Callable[[], None],
+    task: Pendulum,
     seed: int | None,
-    agent: Policy | None,
+    policy: Policy | None,
     print_steps: bool,
 ) -> int:
-    from keras_pendulum.optimum.optimal_return import USUAL_SEEDS
+    from keras_pendulum.optimum.solution import USUAL_SEEDS
     from keras_pendulum.play.game import Game
     from keras_pendulum.play.window import play
 
     if seed is None:
         # The optimal returns of these seeds are shipped, or cached after their first use.
         seed = random.choice(USUAL_SEEDS)
-    window.show_loading(f"Loading the best possible returns at g = {gravity:g} m/s² …")
+    window.show_loading(f"Loading the best possible returns at g = {task.gravity:g} m/s² …")
     print_line = functools.partial(print, flush=True)
-    game = Game(gravity, seed, agent, print_line=print_line, print_steps=print_steps)
+    game = Game(task, seed, policy, print_line=print_line, print_steps=print_steps)
     try:
-        play(game, window, control_c.check)
+        play(game, window, check_control_c)
     finally:
         game.close()
     return 0

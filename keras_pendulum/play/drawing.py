@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pygame
 
-from keras_pendulum.environments.actions import MAX_TORQUE
-from keras_pendulum.torque_colors import rgb, torque_color
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.figures.style import rgb, torque_color
 
 Color = tuple[int, int, int]
 States = Sequence[tuple[float, float]]  # θ (rad) and θ̇ (rad/s)

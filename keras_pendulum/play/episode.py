@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.actions import require_torque
+from keras_pendulum.environments.torque import require_torque
 
 if TYPE_CHECKING:
     import gymnasium
-
-Policy = Callable[[NDArray[np.float32]], float]  # observation [3] -> torque in N·m
 
 
 class ManualEpisode:

@@ -10,10 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from keras_pendulum.environments.actions import MAX_TORQUE
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environment
-from keras_pendulum.optimum.optimal_return import USUAL_SEEDS, optimal_return
-from keras_pendulum.play.episode import ManualEpisode, Policy
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.evaluate.policy import Policy
+from keras_pendulum.optimum.solution import USUAL_SEEDS
+from keras_pendulum.optimum.solutions import solution
+from keras_pendulum.play.episode import ManualEpisode
 
 FRAMES_PER_SECOND = 20  # a step of the environment is 0.05 s
 READY_FRAMES = 2 * FRAMES_PER_SECOND  # the player sees the start before the pendulum moves
@@ -81,25 +83,25 @@ class Game:
     The constructor takes some 20 s if the optimal return of the first start is not stored yet.
 
     Args:
-        gravity: m/s².
+        task: the pendulum.
         seed: of the first start.
-        agent: the policy that drives after the player, or None.
+        policy: drives after the player, if there is one.
         print_line: called with each line of output.
         print_steps: print a line for each step of the player.
     """
 
     def __init__(
         self,
-        gravity: float,
+        task: Pendulum,
         seed: int,
-        agent: Policy | None = None,
+        policy: Policy | None = None,
         *,
         print_line: Callable[[str], None] = print,
         print_steps: bool = False,
     ) -> None:
-        self._gravity, self._agent, self._print_line = gravity, agent, print_line
+        self._task, self._policy, self._print_line = task, policy, print_line
         self._print_steps = print_steps
-        self._env = make_environment("Pendulum-v1", gravity)
+        self._env = task.make_env()
         self.finished = False
         self._stage = _Stage.READY
         self._start(seed)
@@ -140,7 +142,7 @@ class Game:
         episode = self._episode
         return View(
             title=_TITLES[self._stage],
-            gravity=self._gravity,
+            gravity=self._task.gravity,
             seed=self._seed,
             torque=episode.torque,
             step=episode.steps,
@@ -159,8 +161,8 @@ class Game:
 
     def _start(self, seed: int) -> None:
         self._seed = seed
-        self._optimal_return = float(optimal_return(self._gravity, [seed])[0])
-        self._print_line(f"Start: seed {seed}, g = {self._gravity:g}")
+        self._optimal_return = float(solution(self._task).best_returns([seed])[0])
+        self._print_line(f"Start: seed {seed}, g = {self._task.gravity:g}")
         self._restart()
 
     def _restart(self) -> None:
@@ -175,15 +177,17 @@ class Game:
         if self._print_steps:
             self._print_line(str(self._player))
         if self._player.done:
-            if self._agent is None:
+            if self._policy is None:
                 self._show_score()
             else:
+                self._policy.reset()
                 self._episode = ManualEpisode(self._env, self._seed)
                 self._stage = _Stage.AGENT
 
     def _step_agent(self) -> None:
-        assert self._agent is not None
-        self._episode.step(self._agent(self._episode.observation))
+        assert self._policy is not None
+        action = self._policy.action(self._episode.observation)
+        self._episode.step(self._task.torque_of(action))
         if self._episode.done:
             self._show_score()
 

@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 import pygame
 
-from keras_pendulum.environments.actions import MAX_TORQUE
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import UserError
+from keras_pendulum.figures.style import rgb, torque_color
 from keras_pendulum.play.drawing import (
     INK,
     LARGE,
@@ -22,7 +23,6 @@ from keras_pendulum.play.drawing import (
     draw_portrait,
 )
 from keras_pendulum.play.game import FRAMES_PER_SECOND, Game, Key, View
-from keras_pendulum.torque_colors import rgb, torque_color
 
 KEYS = {
     pygame.K_j: Key.CLOCKWISE,

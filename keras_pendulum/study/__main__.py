@@ -5,11 +5,9 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import os
 import sys
 import time
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,9 +19,7 @@ from keras_pendulum.study.arms import Arm, default_arms, own_arms, study_name
 from keras_pendulum.tensorflow_setup import require_tensorflow
 
 if TYPE_CHECKING:
-    from distributed import Client
-
-    from keras_pendulum.study.job import Job
+    from keras_pendulum.study.job import Job, Reply
     from keras_pendulum.study.results_folder import ResultsFolder
     from keras_pendulum.study.runner import FinishedJob
 
@@ -121,37 +117,24 @@ def _study(arguments: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
-def _workers(
-    arguments: argparse.Namespace, versions: dict[str, str], job_count: int
-) -> AbstractContextManager[Client]:
-    from keras_pendulum.study.dask_workers import cluster_workers, local_workers
-
-    if arguments.scheduler:
-        return cluster_workers(arguments.scheduler, versions)
-    return local_workers(min(arguments.workers or _core_count(), job_count))
-
-
-def _core_count() -> int:
-    """Returns the number of cores that this process may use."""
-    if sys.platform == "linux":
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def _make_runs(
     folder: ResultsFolder, jobs: Sequence[Job], arguments: argparse.Namespace
 ) -> list[FinishedJob]:
     """Makes the runs and prints a line for each; returns the failed ones."""
-    from keras_pendulum.study.dask_workers import dashboard
+    from dask.system import CPU_COUNT
+
+    from keras_pendulum.study.dask_workers import cluster_workers, dashboard, local_workers
     from keras_pendulum.study.job import train_and_score
     from keras_pendulum.study.runner import run_all
 
-    total = folder.job_count
     failures: list[FinishedJob] = []
-    training = evaluation = 0.0
-    made = 0
+    replies: list[Reply] = []
     started = time.perf_counter()
-    with _workers(arguments, folder.versions, len(jobs)) as client, folder.create_and_lock():
+    if arguments.scheduler:
+        connected = cluster_workers(arguments.scheduler, folder.versions)
+    else:
+        connected = local_workers(min(arguments.workers or CPU_COUNT, len(jobs)))
+    with connected as client, folder.create_and_lock():
         if address := dashboard(client):
             print(f"Dashboard: {address}", flush=True)
         for finished in run_all(client, train_and_score, jobs, _print_problem):
@@ -161,27 +144,32 @@ def _make_runs(
                 _print_problem(f"{job}: failed, {problem}")
                 continue
             result = folder.save(job, reply)
-            made += 1
-            training += reply.training
-            evaluation += reply.evaluation
-            left = int((time.perf_counter() - started) * (len(jobs) - made) / made)
+            replies.append(reply)
+            waiting = len(jobs) - len(replies)
+            left = int((time.perf_counter() - started) * waiting / len(replies))
             print(
                 f"{job}: regret {result.regret:.2f}, {reply.total:.1f} s, "
-                f"{total - len(jobs) + made}/{total}, {left // 60}:{left % 60:02} left",
+                f"{folder.job_count - waiting}/{folder.job_count}, "
+                f"{left // 60}:{left % 60:02} left",
                 flush=True,
             )
         workers = max(1, len(client.nthreads()))
-    if made:
-        seconds = time.perf_counter() - started
-        overhead = seconds * workers - training - evaluation
-        print(
-            f"{made} runs in {seconds:.0f} s, workers: {workers}, runs per core-hour: "
-            f"{3600 * made / (seconds * workers):.0f}; mean seconds per run: "
-            f"{training / made:.2f} training, {evaluation / made:.2f} evaluation, "
-            f"{overhead / made:.2f} overhead (start of the workers and wait for the last run "
-            "included)"
-        )
+    if replies:
+        _print_cost(replies, time.perf_counter() - started, workers)
     return failures
+
+
+def _print_cost(replies: Sequence[Reply], seconds: float, workers: int) -> None:
+    count = len(replies)
+    per_run = seconds * workers / count
+    training = sum(reply.training for reply in replies) / count
+    evaluation = sum(reply.evaluation for reply in replies) / count
+    print(
+        f"{count} runs in {seconds:.0f} s, workers: {workers}, runs per core-hour: "
+        f"{3600 / per_run:.0f}; mean seconds per run: {training:.2f} training, "
+        f"{evaluation:.2f} evaluation, {per_run - training - evaluation:.2f} overhead (start of "
+        "the workers and wait for the last run included)"
+    )
 
 
 def _write_tables(folder: ResultsFolder, arms: Sequence[Arm]) -> None:

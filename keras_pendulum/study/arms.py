@@ -3,22 +3,52 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
-from keras_pendulum.config.config import Config
+from keras_pendulum.config.config import Config, Recording
+from keras_pendulum.config.fields import format_value
 from keras_pendulum.config.presets import preset
 from keras_pendulum.config.settings import parse_setting
-from keras_pendulum.environments.tasks import task_name
 from keras_pendulum.errors import ConfigError
-from keras_pendulum.study.arm_labels import describe_setting
 
 # The defects of `original` that these settings fix. The default study fixes them first.
-_FIXED_DEFECTS = {"updates_per_episode": "update-starvation", "target_update": "no-target-network"}
-# The defects that only `walkthrough` has.
-_OTHER_DEFECTS: dict[str, dict[str, Any]] = {"index-truncation": {"stored_index": "truncated"}}
-_ANY_SAVE_EVERY = Config.save_every
+_FIXED_DEFECTS = {
+    "updates_per_episode": " (update-starvation)",
+    "target_update": " (no-target-network)",
+}
+# The words for a setting in the figure. A value that is missing here has its setting's name.
+_DESCRIPTIONS: dict[str, Callable[[Any], str]] = {
+    "updates_per_episode": lambda count: (
+        "one update per episode" if count == 1 else f"{count} updates per episode"
+    ),
+    "max_episode_steps": lambda steps: f"episodes of {steps} steps",
+    "replay_capacity": lambda size: f"replay buffer of {size:,} steps".replace(",", "\u202f"),
+    "hidden_units": lambda units: f"layers of {', '.join(map(str, units))}",
+    "double_q": lambda double: "double Q-learning" if double else "no double Q-learning",
+    "average_updates": lambda count: (
+        "no average of the weights" if count == 1 else f"weights averaged over {count} updates"
+    ),
+    "target_update": {
+        "none": "no target network",
+        "soft": "soft target network",
+        "hard": "target network by copies",
+    }.__getitem__,
+    "learning_rate_schedule": {
+        "constant": "constant learning rate",
+        "cosine": "learning rate falls to 0",
+    }.__getitem__,
+    "stored_index": {"exact": "exact indices", "truncated": "truncated indices"}.__getitem__,
+}
+# The settings that no arm has, and why.
+_REFUSED = dict.fromkeys(
+    ("seed", "preset"),
+    "the study's seeds are 0, 1, …, and the preset comes before the settings",
+) | dict.fromkeys(
+    Recording.__dataclass_fields__,
+    "a study evaluates each run at its end, and saves no weights",
+)
 # Files have the arm's name. With these limits, no path below the folder where the command runs is
 # longer than 200 characters: Windows allows 260 in all.
 _MAX_NAME = 64
@@ -34,7 +64,7 @@ class Arm:
     config: Config
     baseline: str | None = None  # name of the arm that it is compared with
     has_curve: bool = True  # whether the figure shows its learning curve
-    label: str = ""  # in the figure; empty for its name
+    label: str = ""  # its name in the figure; empty for `name`
 
     @property
     def slug(self) -> str:
@@ -43,19 +73,14 @@ class Arm:
         return f"arm-{slug}" if _RESERVED.match(slug) else slug
 
     @property
-    def shown_name(self) -> str:
-        """The name in the figure."""
-        return self.label or self.name
-
-    @property
     def training_config(self) -> Config:
         """The settings that decide a run, without its seed; arms that share them share runs."""
-        return replace(self.config, preset="", seed=0, save_every=_ANY_SAVE_EVERY)
+        return Config(**{**self.config.learning(), "preset": "", "seed": 0})
 
     @property
     def task(self) -> str:
-        """Environment and gravity; regrets of different tasks cannot be compared."""
-        return task_name(self.config.environment, self.config.gravity)
+        """The name of the task; regrets of different tasks cannot be compared."""
+        return self.config.task.name
 
 
 def default_arms() -> list[Arm]:
@@ -66,32 +91,38 @@ def default_arms() -> list[Arm]:
     """
     original, reference = preset("original"), preset("reference")
     changed = [
-        spec.name
-        for spec in fields(Config)
-        if spec.name != "preset" and getattr(original, spec.name) != getattr(reference, spec.name)
+        name
+        for name, value in vars(original).items()
+        if name != "preset" and value != getattr(reference, name)
     ]
-    fixes = list(_FIXED_DEFECTS)
-    changed.sort(key=lambda name: fixes.index(name) if name in fixes else len(fixes))
+    changed.sort(key=lambda name: name not in _FIXED_DEFECTS)
     arms = [Arm("original", original)]
     for name in changed:
         value = getattr(reference, name)
-        config = replace(arms[-1].config, **{name: value})
+        config = arms[-1].config.change(**{name: value})
         label = f"+ {describe_setting(name, value)}"
         arms.append(Arm(f"+ {name}={value}", config, arms[-1].name, False, label))
     last = f"{arms[-1].label} = reference"
     arms[-1] = replace(arms[-1], name="reference", has_curve=True, label=last)
-    for name in changed:
-        config = replace(reference, **{name: getattr(original, name)})
-        defect = f" ({_FIXED_DEFECTS[name]})" if name in _FIXED_DEFECTS else ""
-        label = f"reference with {describe_setting(name, getattr(original, name))}"
-        name = f"reference without {name}{defect}"
-        arms.append(Arm(name, config, "reference", label=label))
-    for defect, settings in _OTHER_DEFECTS.items():
-        config = replace(reference, **settings)
-        label = " and ".join(describe_setting(*item) for item in settings.items())
-        label = f"reference with {label}"
-        arms.append(Arm(f"reference with {defect}", config, "reference", label=label))
+    undone = [
+        (f"reference without {name}{_FIXED_DEFECTS.get(name, '')}", name, getattr(original, name))
+        for name in changed
+    ]
+    # The defect that only `walkthrough` has.
+    undone.append(("reference with index-truncation", "stored_index", "truncated"))
+    for arm_name, name, value in undone:
+        config = reference.change(**{name: value})
+        label = f"reference with {describe_setting(name, value)}"
+        arms.append(Arm(arm_name, config, "reference", label=label))
     return arms
+
+
+def describe_setting(name: str, value: Any) -> str:
+    """Returns a value of a setting in words, such as `one update per episode`."""
+    try:
+        return _DESCRIPTIONS[name](value)
+    except KeyError:
+        return f"{name.replace('_', ' ')} {format_value(value)}"
 
 
 def own_arms(presets: Sequence[str], texts: Sequence[str]) -> list[Arm]:
@@ -101,12 +132,19 @@ def own_arms(presets: Sequence[str], texts: Sequence[str]) -> list[Arm]:
     form, and for two arms of one name.
     """
     arms = [Arm(name, preset(name)) for name in presets] + [_parse_arm(text) for text in texts]
-    _require_names(arms)
-    first: dict[str, str] = {}  # name of the first arm by task
-    compared = []
+    compared: list[Arm] = []
     for arm in arms:
-        compared.append(replace(arm, baseline=first.get(arm.task)))
-        first.setdefault(arm.task, arm.name)
+        if len(arm.slug) > _MAX_NAME or not arm.name.isprintable():
+            raise ConfigError(
+                f"the arm's name {arm.name[:40]!r} is longer than {_MAX_NAME} letters or not "
+                "printable"
+            )
+        if arm.slug in [other.slug for other in compared]:
+            raise ConfigError(
+                f"two arms have the name {arm.name!r} in file names: rename one of them"
+            )
+        same_task = (other.name for other in compared if other.task == arm.task)
+        compared.append(replace(arm, baseline=next(same_task, None)))
     return compared
 
 
@@ -126,30 +164,7 @@ def _parse_arm(text: str) -> Arm:
         field, equals, value = word.partition("=")
         if not equals:
             raise ConfigError(f"the arm {name.strip()!r} has {word!r}; expected field=value")
-        if field in ("seed", "preset"):
-            raise ConfigError(
-                f"the arm {name.strip()!r} cannot set {field}: the study's seeds are 0, 1, …, and "
-                "the preset comes before the settings"
-            )
-        if field in ("evaluate_every", "keep_best", "snapshots"):
-            raise ConfigError(
-                f"the arm {name.strip()!r} cannot set {field}: a study evaluates each run at its "
-                "end, and saves no weights"
-            )
+        if field in _REFUSED:
+            raise ConfigError(f"the arm {name.strip()!r} cannot set {field}: {_REFUSED[field]}")
         settings[field] = parse_setting(field, value)
     return Arm(name.strip(), preset(words[0], **settings))
-
-
-def _require_names(arms: Iterable[Arm]) -> None:
-    slugs = set()
-    for arm in arms:
-        if len(arm.slug) > _MAX_NAME or not arm.name.isprintable():
-            raise ConfigError(
-                f"the arm's name {arm.name[:40]!r} is longer than {_MAX_NAME} letters or not "
-                "printable"
-            )
-        if arm.slug in slugs:
-            raise ConfigError(
-                f"two arms have the name {arm.name!r} in file names: rename one of them"
-            )
-        slugs.add(arm.slug)

@@ -31,9 +31,7 @@ _LOCAL_SETTINGS = {
     "distributed.deploy.lost-worker-timeout": "1 day",
     "distributed.worker.profile.enabled": False,  # it would interrupt a run 100 times a second
 }
-
-
-# On Windows, which has no masks of signals, each worker ignores Ctrl-C by itself.
+# Windows has no masks of signals: there, each worker executes this to ignore Ctrl-C.
 _IGNORE_CONTROL_C = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 
 
@@ -61,13 +59,11 @@ def local_workers(count: int) -> Iterator[Client]:
             # By address: `Client(cluster)` would wait for all workers.
             client = Client(cluster.scheduler_address, set_as_default=False)
             stack.callback(_close, client)
-        try:
-            client.wait_for_workers(1, timeout=_FIRST_WORKER_SECONDS)
-        except TimeoutError as error:
-            raise UserError(
-                f"no worker has started within {_FIRST_WORKER_SECONDS} s: look for a full disk or "
-                "memory, and try --workers 1"
-            ) from error
+        _wait_for_worker(
+            client,
+            f"no worker has started within {_FIRST_WORKER_SECONDS} s: look for a full disk or "
+            "memory, and try --workers 1",
+        )
         yield client
 
 
@@ -94,14 +90,17 @@ def cluster_workers(address: str, versions: dict[str, str]) -> Iterator[Client]:
             raise unreachable from error
         stack.callback(_close, client)
         stack.enter_context(_report_lost_scheduler(client, address))
-        try:
-            client.wait_for_workers(1, timeout=_FIRST_WORKER_SECONDS)
-        except TimeoutError as error:
-            raise UserError(
-                f"the scheduler at {address} has no worker: start some with "
-                f"`dask worker {address} --nthreads 1 --nworkers N`"
-            ) from error
-        _require_one_thread(client)
+        _wait_for_worker(
+            client,
+            f"the scheduler at {address} has no worker: start some with "
+            f"`dask worker {address} --nthreads 1 --nworkers N`",
+        )
+        for worker, threads in client.nthreads().items():
+            if threads != 1:
+                raise UserError(
+                    f"the worker {worker} has {threads} threads: start workers with --nthreads 1, "
+                    "one for each core"
+                )
         _require_same_versions(client, versions)
         yield client
 
@@ -113,6 +112,14 @@ def dashboard(client: Client) -> str | None:
         return "distributed.dashboard.scheduler" in sys.modules
 
     return client.dashboard_link if client.run_on_scheduler(has_dashboard) else None
+
+
+def _wait_for_worker(client: Client, problem: str) -> None:
+    """Raises UserError with the problem when there is no worker within a minute."""
+    try:
+        client.wait_for_workers(1, timeout=_FIRST_WORKER_SECONDS)
+    except TimeoutError as error:
+        raise UserError(problem) from error
 
 
 @contextmanager
@@ -136,21 +143,10 @@ def _answers(client: Client) -> bool:
     return True
 
 
-def _require_one_thread(client: Client) -> None:
-    for worker, threads in client.nthreads().items():
-        if threads != 1:
-            raise UserError(
-                f"the worker {worker} has {threads} threads: start workers with --nthreads 1, one "
-                "for each core"
-            )
-
-
 def _require_same_versions(client: Client, versions: dict[str, str]) -> None:
-    def find_versions() -> dict[str, str]:  # sent by value: it runs where the package is missing
-        try:
-            from keras_pendulum.study.job import installed_versions
-        except ImportError:
-            return {}
+    def find_versions() -> dict[str, str]:  # sent by value: the package may be missing there
+        from keras_pendulum.study.job import installed_versions
+
         return installed_versions()
 
     answers: dict[str, Any] = {}
@@ -211,30 +207,23 @@ def _start_resource_tracker() -> None:
     The helper unblocks SIGINT in the thread that starts it, and it would print a warning when the
     study is killed. Windows has no such helper.
     """
-    if sys.platform == "win32":
-        return
-    sys.warnoptions.append("ignore:resource_tracker:UserWarning")
-    try:
+    if sys.platform != "win32":
+        sys.warnoptions.append("ignore:resource_tracker:UserWarning")
         resource_tracker.ensure_running()
-    finally:
         sys.warnoptions.pop()
 
 
 @contextmanager
 def _control_c_delayed() -> Iterator[None]:
     """Delays Ctrl-C to the end of the `with` block; threads that start in it never get it."""
-    pressed: list[int] = []
-    handler = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
-    if sys.platform != "win32":  # there, the main thread alone gets it
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    if sys.platform == "win32":  # it has no masks, and only the main thread gets Ctrl-C
+        yield
+        return
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        if sys.platform != "win32":
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        signal.signal(signal.SIGINT, handler)
-        if pressed and callable(handler):  # it is not where SIGINT is ignored
-            handler(signal.SIGINT, None)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 @contextmanager

@@ -9,14 +9,13 @@ import os
 import platform
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.config.settings import read_settings
 from keras_pendulum.errors import UserError
-from keras_pendulum.optimum.return_cache import LOWEST_REWARD
 from keras_pendulum.tensorflow_setup import fast_import, use_one_thread
 from keras_pendulum.version import __version__
 
@@ -45,9 +44,8 @@ class RunResult(NamedTuple):
     returns: list[float]  # greedy, from the same starts
     average_rewards: list[float]  # per step, while training; means over 10 episodes
     episode_returns: list[float]  # while training; means over 10 episodes
-    # Of the greedy policy after `evaluate_every` episodes, twice as many, … Empty in the results of
-    # older versions, which are valid without them.
-    greedy_regrets: list[float] = []  # noqa: RUF012
+    # Of the greedy policy after `evaluate_every` episodes, twice as many, …
+    greedy_regrets: list[float]
 
     @property
     def regret(self) -> float:
@@ -79,53 +77,30 @@ def train_and_score(job: Job) -> Reply:
         from keras_pendulum.evaluate.evaluation import evaluate_policy
         from keras_pendulum.train.train_dqn import train_dqn
     imported = time.perf_counter()
-    clock = _EvaluationClock()
-    training = train_dqn(
-        replace(job.config, evaluate_every=evaluate_every(job.config)),
-        listeners=[clock.end],
-        on_phase=clock.begin,
-    )
-    trained = time.perf_counter()
+    training = train_dqn(job.config.change(evaluate_every=evaluate_every(job.config)))
+    history = training.history
     score = evaluate_policy(training.network, EVALUATION_EPISODES)
-    evaluated = time.perf_counter()
     result = RunResult(
         optimal_mean_return=score.optimal_mean_return,
         returns=score.returns.tolist(),
-        average_rewards=curve_points([record.average_reward for record in training.history]),
-        episode_returns=curve_points([record.episode_return for record in training.history]),
+        average_rewards=curve_points([record.average_reward for record in history]),
+        episode_returns=curve_points([record.episode_return for record in history]),
         greedy_regrets=[
             round(record.greedy_regret, _DECIMALS)
-            for record in training.history
+            for record in history
             if not math.isnan(record.greedy_regret)
         ],
     )
     data = encode(job, result)
-    total = time.perf_counter() - started
-    training_seconds = trained - imported - clock.seconds
-    evaluation_seconds = evaluated - trained + clock.seconds
-    return Reply(data, training_seconds, evaluation_seconds, total, worker)
+    ended = time.perf_counter()
+    training_seconds = sum(record.seconds for record in history)
+    evaluation_seconds = ended - imported - training_seconds  # during the run, and at its end
+    return Reply(data, training_seconds, evaluation_seconds, ended - started, worker)
 
 
 def evaluate_every(config: Config) -> int:
     """Returns the number of episodes between two greedy evaluations of a study's run."""
     return math.ceil(config.episodes / _EVALUATIONS)
-
-
-class _EvaluationClock:
-    """Hooks of `train_dqn` that sum the seconds of the evaluations during a run."""
-
-    def __init__(self) -> None:
-        self.seconds = 0.0
-        self._began: float | None = None
-
-    def begin(self, phase: str) -> None:
-        if phase == "evaluating":
-            self._began = time.perf_counter()
-
-    def end(self, record: object) -> None:
-        if self._began is not None:
-            self.seconds += time.perf_counter() - self._began
-            self._began = None
 
 
 def curve_points(values: list[float]) -> list[float]:
@@ -138,13 +113,9 @@ def curve_points(values: list[float]) -> list[float]:
 def installed_versions() -> dict[str, str]:
     """Returns the versions of the packages that a result depends on, without importing them."""
     versions = {"keras_pendulum": __version__}
-    for name in ("tensorflow", "keras", "gymnasium", "numpy"):
-        for package in (name, f"{name}-cpu"):
-            try:
-                versions[name] = version(package)
-                break
-            except PackageNotFoundError:
-                versions[name] = "missing"
+    for package in ("tensorflow-cpu", "tensorflow", "keras", "gymnasium", "numpy"):
+        with suppress(PackageNotFoundError):
+            versions[package.removesuffix("-cpu")] = version(package)
     return versions
 
 
@@ -160,7 +131,7 @@ def require_versions(expected: Mapping[str, str], found: Mapping[str, str], who:
 
 def encode(job: Job, result: RunResult) -> bytes:
     """Returns a small JSON file with its SHA-256; equal results have equal bytes."""
-    return _with_checksum({**_settings(job), "regret": result.regret, **result._asdict()})
+    return _with_checksum(_content(job, result))
 
 
 def decode(data: bytes, job: Job) -> RunResult | None:
@@ -170,62 +141,59 @@ def decode(data: bytes, job: Job) -> RunResult | None:
     """
     try:
         content = json.loads(data)["result"]
-        settings = _settings(job)
-        if _with_checksum(content) != data:
-            return None
-        if {key: content[key] for key in settings} != settings:
-            return None
-        fields = {"greedy_regrets": [], **content}  # results of older versions have none
-        result = RunResult(*(fields[field] for field in RunResult._fields))
-        valid = _is_possible(result, job.config) and content["regret"] == result.regret
-        return result if valid else None
+        result = RunResult(*(content[field] for field in RunResult._fields))
+        # Older files also record settings that have no effect.
+        config = learning_settings(read_settings(content["config"]))
+        valid = (
+            _with_checksum(content) == data
+            and _is_possible(result, job.config)
+            and {**content, "config": config} == _content(job, result)
+        )
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
+    return result if valid else None
 
 
 def _is_possible(result: RunResult, config: Config) -> bool:
     """Returns whether a run can have these numbers: how many there are, and their ranges."""
-    task = TASKS[config.environment]
-    low, high = (LOWEST_REWARD, 0.0) if task.has_torque else (0.0, 1.0)  # of a step's reward
+    task = config.task
+    low, high = task.reward_range
+    steps, training_steps = task.steps_per_episode, config.max_episode_steps
     points = math.ceil(config.episodes / EPISODES_PER_POINT)
     evaluations = config.episodes // evaluate_every(config)
-    largest_regret = task.steps_per_episode * (high - low)
-
-    def are_between(numbers: list[float], low: float, high: float) -> bool:
-        return all(isinstance(number, float) and low <= number <= high for number in numbers)
-
-    def are_possible(numbers: list[float], count: int, steps: int) -> bool:
-        return len(numbers) == count and are_between(numbers, steps * low, steps * high)
-
-    return (
-        are_possible([result.optimal_mean_return], 1, task.steps_per_episode)
-        and are_possible(result.returns, EVALUATION_EPISODES, task.steps_per_episode)
-        and are_possible(result.average_rewards, points, 1)
-        and are_possible(result.episode_returns, points, config.max_episode_steps)
-        and len(result.greedy_regrets) in (0, evaluations)
-        and are_between(result.greedy_regrets, -largest_regret, largest_regret)
+    largest_regret = steps * (high - low)
+    ranges = [
+        ([result.optimal_mean_return], 1, steps * low, steps * high),
+        (result.returns, EVALUATION_EPISODES, steps * low, steps * high),
+        (result.average_rewards, points, low, high),
+        (result.episode_returns, points, training_steps * low, training_steps * high),
+        (result.greedy_regrets, evaluations, -largest_regret, largest_regret),
+    ]
+    return all(
+        len(numbers) == count
+        and all(isinstance(number, float) and least <= number <= most for number in numbers)
+        for numbers, count, least, most in ranges
     )
 
 
-def _settings(job: Job) -> dict[str, Any]:
-    """Returns everything that identifies the job, as JSON reads it back."""
-    config = config_as_json(job.config)
+def learning_settings(config: Config) -> dict[str, Any]:
+    """Returns the settings that an arm can have."""
+    settings = config.learning()
+    del settings["seed"]
+    return settings
+
+
+def _content(job: Job, result: RunResult) -> dict[str, Any]:
+    """Returns the result with everything that identifies the job."""
     return {
         "arm": job.arm,
-        "seed": config.pop("seed"),
-        "config": config,
+        "seed": job.config.seed,
+        "config": learning_settings(job.config),
         "versions": job.versions,
         "episodes_per_point": EPISODES_PER_POINT,
+        "regret": result.regret,
+        **result._asdict(),
     }
-
-
-def config_as_json(config: Config) -> dict[str, Any]:
-    """Returns the settings that a run of a study can have, as JSON reads them back."""
-    settings = dict(vars(config))  # `asdict` copies deeply, which takes ten times as long
-    settings["hidden_units"] = list(config.hidden_units)
-    for name in ("evaluate_every", "keep_best", "snapshots"):  # no arm sets them, see `own_arms`
-        del settings[name]
-    return settings
 
 
 def _with_checksum(content: dict[str, Any]) -> bytes:

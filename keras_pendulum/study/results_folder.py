@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.errors import UserError
+from keras_pendulum.config.settings import read_settings
+from keras_pendulum.errors import ConfigError, UserError
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.folder_lock import LOCK_FILE, lock_folder
 from keras_pendulum.study.arms import Arm
@@ -22,13 +21,11 @@ from keras_pendulum.study.job import (
     Job,
     Reply,
     RunResult,
-    config_as_json,
     decode,
     installed_versions,
+    learning_settings,
     require_versions,
 )
-
-_LOG_COLUMNS = ("arm", "seed", "worker", "training", "evaluation", "total")
 
 
 class ResultsFolder:
@@ -63,12 +60,11 @@ class ResultsFolder:
 
         Without its `study.json`, a folder is usable when all its results belong to this study.
         """
-        try:
-            names = {file.name for file in self._folder.iterdir()} - {LOCK_FILE}
-        except FileNotFoundError:
-            return
-        except OSError as error:
-            raise UserError(f"cannot read the folder {self.path}: {error.strerror}") from error
+        with _user_error(f"cannot read the folder {self.path}"):
+            try:
+                names = {file.name for file in self._folder.iterdir()} - {LOCK_FILE}
+            except FileNotFoundError:
+                return
         if self._manifest.name in names:
             self._require_same_study()
         elif results := sorted(self._results.glob("*/*.json")):
@@ -84,21 +80,17 @@ class ResultsFolder:
 
         Raises UserError when the folder is not usable or is in use, or cannot be written.
         """
-        try:
+        with _user_error(f"cannot make the folder {self.path}"):
             self._folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
         with lock_folder(self._folder) as self._require_in_place:
             self.require_usable()
             if not self._manifest.exists():
-                write_atomically(self._manifest, _encode_json(self._description()))
-            try:
+                content = {"versions": self.versions, "arms": self._description()}
+                text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+                write_atomically(self._manifest, text.encode())
+            with _user_error(f"cannot write in {self.path}"):
                 for arm in self._first_arms.values():
                     (self._results / arm.slug).mkdir(parents=True, exist_ok=True)
-            except OSError as error:
-                raise UserError(f"cannot write in {self.path}: {error.strerror}") from error
-            if not self._log.exists():
-                write_atomically(self._log, (",".join(_LOG_COLUMNS) + "\n").encode())
             yield
 
     def jobs(self) -> list[Job]:
@@ -131,18 +123,15 @@ class ResultsFolder:
             )
         self._require_in_place()
         write_atomically(self._file(job), reply.result)
-        seconds = (reply.training, reply.evaluation, reply.total)
-        line = io.StringIO()
-        csv.writer(line, lineterminator="\n").writerow(
-            [job.arm, job.config.seed, reply.worker, *(f"{value:.3f}" for value in seconds)]
-        )
-        try:
-            with retry_while_open(
-                lambda: open(self._log, "a", encoding="utf-8", newline="")
-            ) as file:
-                file.write(line.getvalue())
-        except OSError as error:
-            raise UserError(f"cannot write {self._log}: {error.strerror}") from error
+        seconds = (f"{each:.3f}" for each in (reply.training, reply.evaluation, reply.total))
+        with (
+            _user_error(f"cannot write {self._log}"),
+            retry_while_open(lambda: open(self._log, "a", encoding="utf-8", newline="")) as file,
+        ):
+            log = csv.writer(file, lineterminator="\n")
+            if file.tell() == 0:
+                log.writerow(("arm", "seed", "worker", "training", "evaluation", "total"))
+            log.writerow((job.arm, job.config.seed, reply.worker, *seconds))
         return result
 
     def write(self, name: str, content: bytes) -> None:
@@ -151,64 +140,64 @@ class ResultsFolder:
 
     def results(self) -> dict[str, list[RunResult]]:
         """Returns the valid results by the arm's name, in the order of their seeds."""
-        found: dict[Config, list[RunResult]] = {config: [] for config in self._first_arms}
-        for job, config in zip(self.jobs(), [*self._first_arms] * self._seeds, strict=True):
-            result = self._read(job)
-            if result is not None:
-                found[config].append(result)
-        return {arm.name: found[arm.training_config] for arm in self._arms}
+        return {
+            arm.name: [
+                result
+                for seed in range(self._seeds)
+                if (result := self._read(self._job(self._first_arms[arm.training_config], seed)))
+            ]
+            for arm in self._arms
+        }
 
     def _job(self, arm: Arm, seed: int) -> Job:
-        return Job(arm.name, arm.slug, replace(arm.config, seed=seed), self.versions)
+        return Job(arm.name, arm.slug, arm.config.change(seed=seed), self.versions)
 
     def _file(self, job: Job) -> Path:
         return self._results / job.slug / f"{job.slug}-seed{job.config.seed}.json"
 
     def _read(self, job: Job) -> RunResult | None:
-        try:
-            return decode(self._file(job).read_bytes(), job)
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            raise UserError(f"cannot read {self._file(job)}: {error.strerror}") from error
+        with _user_error(f"cannot read {self._file(job)}"):
+            try:
+                return decode(self._file(job).read_bytes(), job)
+            except FileNotFoundError:
+                return None
 
-    def _description(self) -> dict[str, Any]:
-        arms = [
-            {"name": arm.name, "baseline": arm.baseline, "config": config_as_json(arm.config)}
+    def _description(self) -> list[dict[str, Any]]:
+        return [
+            {"name": arm.name, "baseline": arm.baseline, "config": learning_settings(arm.config)}
             for arm in self._arms
         ]
-        return {"versions": self.versions, "arms": arms}
 
     def _require_same_study(self) -> None:
-        other_study = UserError(
-            f"{self.path} holds another study, with other arms or settings: name another folder "
-            "with --out"
-        )
         try:
-            manifest = json.loads(self._manifest.read_bytes())
-        except OSError as error:
-            raise UserError(f"cannot read {self._manifest}: {error.strerror}") from error
+            with _user_error(f"cannot read {self._manifest}"):
+                manifest = json.loads(self._manifest.read_bytes())
         except ValueError as error:
             raise UserError(
                 f"{self._manifest} is damaged: remove it and run the same command again, which "
                 "uses the results found; or name another folder with --out"
             ) from error
-        if not isinstance(manifest, dict) or not isinstance(manifest.get("versions"), dict):
-            raise other_study
-        require_versions(manifest["versions"], self.versions, f"{self.path}: this machine")
-        if manifest.get("arms") != json.loads(_encode_json(self._description()))["arms"]:
-            raise other_study
+        with suppress(AttributeError, KeyError, TypeError, ConfigError):  # of other JSON
+            require_versions(manifest["versions"], self.versions, f"{self.path}: this machine")
+            # Older files also record settings that have no effect.
+            arms = [
+                {**arm, "config": learning_settings(read_settings(arm["config"]))}
+                for arm in manifest["arms"]
+            ]
+            if arms == self._description():
+                return
+        raise UserError(
+            f"{self.path} holds another study, with other arms or settings: name another folder "
+            "with --out"
+        )
 
     def _require_own_results(self, files: Iterable[Path]) -> None:
-        jobs = (
-            self._job(arm, int(name[1]))
-            for file in files
-            for arm in self._first_arms.values()
-            if (name := re.fullmatch(rf"{re.escape(arm.slug)}-seed(\d{{1,6}})", file.stem))
-        )
-        own = {self._file(job) for job in jobs if self._read(job) is not None}
+        arms = {arm.slug: arm for arm in self._first_arms.values()}
         for file in files:
-            if file not in own:
+            arm = arms.get(file.parent.name)
+            seed = re.search(r"-seed(\d{1,6})$", file.stem)
+            job = self._job(arm, int(seed[1])) if arm and seed else None
+            if job is None or self._file(job) != file or self._read(job) is None:
                 raise UserError(
                     f"{file} is no result of this study, and study.json is missing: run the "
                     "command that made the results, with its presets and arms, or name another "
@@ -216,5 +205,10 @@ class ResultsFolder:
                 )
 
 
-def _encode_json(content: Any) -> bytes:
-    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+@contextmanager
+def _user_error(problem: str) -> Iterator[None]:
+    """Raises UserError with the problem and its reason for an OSError in the `with` block."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{problem}: {error.strerror}") from error

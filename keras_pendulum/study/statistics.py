@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import bootstrap, mannwhitneyu, trim_mean
 
-CONFIDENCE = 0.95
 _RESAMPLES = 9999
 _CURVE_RESAMPLES = 999
 _BATCH_NUMBERS = 2_000_000  # resampled at once, so that the memory does not grow with the runs
@@ -25,27 +24,22 @@ _TRIMMED = 0.25  # at either end
 class Interval(NamedTuple):
     """An estimate and its 95 % interval; the bounds are NaN for a sample of one run."""
 
-    value: float
-    low: float
-    high: float
+    value: Any  # a number, or [points] of a curve
+    low: Any
+    high: Any
 
 
 def interquartile_mean(values: ArrayLike) -> Interval:
     """Returns the mean of the middle half of the runs' values [N], N at least 1."""
-    sample = np.asarray(values, np.float64)
-    value = float(trim_mean(sample, _TRIMMED))
-    low, high = _bounds([sample], _iqm, _RESAMPLES)
-    return Interval(value, float(low), float(high))
+    return _estimate([values], _iqm, _RESAMPLES)
 
 
-def curve_band(curves: ArrayLike) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+def curve_band(curves: ArrayLike) -> Interval:
     """Returns the interquartile mean of curves [N, points] and its bounds, each [points].
 
     The interval holds for each point alone, not for the whole curve.
     """
-    sample = np.asarray(curves, np.float64)
-    low, high = _bounds([sample], _iqm, _CURVE_RESAMPLES)
-    return trim_mean(sample, _TRIMMED, axis=0), low, high
+    return _estimate([curves], _iqm, _CURVE_RESAMPLES)
 
 
 def probability_of_improvement(regrets: ArrayLike, baseline_regrets: ArrayLike) -> Interval:
@@ -53,30 +47,25 @@ def probability_of_improvement(regrets: ArrayLike, baseline_regrets: ArrayLike) 
 
     It is the Mann-Whitney statistic divided by N·M; a tie counts half.
     """
-    samples = np.asarray(regrets, np.float64), np.asarray(baseline_regrets, np.float64)
-    low, high = _bounds(samples, _share_below, _RESAMPLES)
-    return Interval(float(_share_below(*samples)), float(low), float(high))
+    return _estimate([regrets, baseline_regrets], _share_below, _RESAMPLES)
 
 
-def _bounds(
-    samples: Sequence[NDArray[np.float64]], statistic: Callable[..., Any], resamples: int
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Returns the interval of a statistic; runs are resampled along the samples' first axis."""
-    if min(len(sample) for sample in samples) < 2:
-        unknown = np.full(samples[0].shape[1:], math.nan)
-        return unknown, unknown
+def _estimate(runs: Sequence[ArrayLike], statistic: Callable[..., Any], resamples: int) -> Interval:
+    """Returns a statistic with its interval; runs are resampled along the first axis."""
+    samples = [np.asarray(each, np.float64) for each in runs]
+    value = statistic(*samples)
+    if min(map(len, samples)) < 2:
+        return Interval(value, value * math.nan, value * math.nan)
     interval = bootstrap(
         samples,
         statistic,
         n_resamples=resamples,
         batch=max(1, _BATCH_NUMBERS // sum(sample.size for sample in samples)),
-        vectorized=True,
-        axis=0,
-        confidence_level=CONFIDENCE,
+        confidence_level=0.95,
         method="percentile",
         rng=np.random.default_rng(0),
     ).confidence_interval
-    return np.asarray(interval.low), np.asarray(interval.high)
+    return Interval(value, *interval)
 
 
 def _iqm(sample: NDArray[Any], axis: int = 0) -> Any:

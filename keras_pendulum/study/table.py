@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from keras_pendulum.optimum.discounted import discount_cost
+from keras_pendulum.optimum.solutions import solution
 from keras_pendulum.study.arms import Arm
 from keras_pendulum.study.job import EVALUATION_EPISODES, RunResult
 from keras_pendulum.study.statistics import Interval, interquartile_mean, probability_of_improvement
@@ -28,25 +28,22 @@ class Row:
 
     def as_json(self) -> dict[str, Any]:
         """Returns the row by table.csv's column names; None for an unknown number."""
-        numbers = {
+        better = self.better or (None, None, None)
+        values = {
+            "arm": self.arm.name,
+            "task": self.arm.task,
+            "runs": len(self.regrets),
             "regret_iqm": self.regret.value,
             "regret_low": self.regret.low,
             "regret_high": self.regret.high,
             "regret_mean": sum(self.regrets) / len(self.regrets),
             "regret_worst": max(self.regrets),
-            "discount_regret": math.nan if self.discount_regret is None else self.discount_regret,
-        }
-        better = self.better or Interval(math.nan, math.nan, math.nan)
-        numbers |= dict(
-            zip(("better_probability", "better_low", "better_high"), better, strict=True)
-        )
-        return {
-            "arm": self.arm.name,
-            "task": self.arm.task,
-            "runs": len(self.regrets),
-            **{name: None if math.isnan(value) else value for name, value in numbers.items()},
+            "discount_regret": self.discount_regret,
+            **dict(zip(("better_probability", "better_low", "better_high"), better, strict=True)),
             "compared_with": self.arm.baseline if self.better else None,
         }
+        # Only NaN differs from itself.
+        return {name: value if value == value else None for name, value in values.items()}
 
 
 def make_rows(arms: Sequence[Arm], results: Mapping[str, Sequence[RunResult]]) -> list[Row]:
@@ -57,15 +54,10 @@ def make_rows(arms: Sequence[Arm], results: Mapping[str, Sequence[RunResult]]) -
         own, baseline = regrets[arm.name], regrets.get(arm.baseline or "", [])
         if own:
             better = probability_of_improvement(own, baseline) if baseline else None
-            rows.append(Row(arm, own, interquartile_mean(own), _discount_regret(arm), better))
+            starts = range(EVALUATION_EPISODES)
+            cost = solution(arm.config.task).discount_cost(arm.config.discount, starts)
+            rows.append(Row(arm, own, interquartile_mean(own), cost, better))
     return rows
-
-
-def _discount_regret(arm: Arm) -> float | None:
-    """Returns the part of the regret that the discount alone costs; None for CartPole."""
-    if arm.config.gravity is None:
-        return None
-    return discount_cost(arm.config.gravity, arm.config.discount, range(EVALUATION_EPISODES))
 
 
 def as_markdown(rows: Sequence[Row]) -> str:

@@ -14,7 +14,7 @@ from conftest import Refusal
 
 import keras_pendulum as kp
 from keras_pendulum.compare import __main__ as compare
-from keras_pendulum.train.checkpoint import load_history
+from keras_pendulum.storage.recorded_run import load_recorded_run
 
 
 def make_run(path: Path, preset: str, **settings: object) -> kp.TrainingResult:
@@ -155,6 +155,7 @@ def test_damaged_run_is_one_error_line(
 
 def test_history_of_a_checkpoint_is_that_of_the_run(tmp_path: Path) -> None:
     result = make_run(tmp_path, "original")
-    config, history = load_history(tmp_path / "pendulum_weight.h5")
+    recorded = load_recorded_run(tmp_path / "pendulum_weight.h5")
+    config, history = recorded.config, recorded.history
     assert config == kp.preset("original", episodes=4, hidden_units=(8, 8))
     assert [record[:4] for record in history] == [record[:4] for record in result.history]

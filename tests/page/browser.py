@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import shutil
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from conftest import wait_for
 from numpy.typing import NDArray
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
@@ -63,7 +62,7 @@ class Player:
     def open(self, address: str) -> None:
         """Opens a page and waits until it is painted: before that, the browser drops keys."""
         self.driver.get(address)
-        self.wait(lambda: self.run("return performance.getEntriesByType('paint').length > 0"))
+        wait_for(lambda: self.run("return performance.getEntriesByType('paint').length > 0"))
 
     def find(self, id: str) -> WebElement:
         return self.driver.find_element(By.ID, id)
@@ -108,16 +107,26 @@ class Player:
         entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
         return entries
 
-    def wait(self, condition: Callable[[], bool], seconds: float = 60) -> None:
-        end = time.monotonic() + seconds
-        while not condition():
-            assert time.monotonic() < end, f"the condition is still false after {seconds} s"
-            time.sleep(0.02)
+    def pass_time(self, seconds: int, before: str = "") -> int:
+        """Runs a script and the frames of simulated seconds, 60 in each; returns the last step."""
+        step = self.run(
+            f"{before};"
+            "const real = requestAnimationFrame; requestAnimationFrame = () => {};"
+            "for (let i = 0; i < 60 * arguments[0]; i++)"
+            "  pendulum.page.frame(1000 / 60 * (i + 1), 1000 / 60 * i);"
+            "requestAnimationFrame = real; return pendulum.state().steps",
+            seconds,
+        )
+        return int(step)
+
+    def redraw(self) -> None:
+        """Waits until a frame has drawn everything anew."""
+        self.run("pendulum.page.changed = true")
+        wait_for(lambda: not self.run("return pendulum.page.changed"))
 
     def picture(self, id: str) -> NDArray[np.uint8]:
         """Redraws a canvas; returns its pixels [rows, columns, RGBA]."""
-        self.run("pendulum.page.changed = true")
-        self.wait(lambda: not self.run("return pendulum.page.changed"))
+        self.redraw()
         width, pixels = self.run(
             "const c = document.getElementById(arguments[0]);"
             "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"

@@ -10,10 +10,12 @@ import h5py
 import numpy as np
 import pytest
 from browser import WEB, Player, shown
+from conftest import wait_for
+from page_fixtures import coarse_optimum
 from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
-from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.version import __version__
 
@@ -26,7 +28,7 @@ def test_two_networks_run_in_step_from_one_start(duel: str, player: Player) -> N
     player.press("t")
     assert [player.text(f"name-{i}") for i in (0, 1)] == ["you", "original"]
     player.press("t")
-    env = make_environment("Pendulum-v1", 1.0)
+    env = Pendulum().make_env()
     env.reset(seed=3)
     pendulum: Any = env.unwrapped
     start = pendulum.state.tolist()
@@ -62,7 +64,7 @@ def test_names_lines_and_q_values_belong_to_their_network(duel: str, player: Pla
     assert styles == ["solid", "dashed"]  # as the paths on the phase portrait
     player.set_screen(667, 375)
     player.run("pendulum.page.other.return = -1234.56; pendulum.page.changed = true")
-    player.wait(lambda: player.text("return-1") == "−1234.6")
+    wait_for(lambda: player.text("return-1") == "−1234.6")
     tops = player.run(
         "return ['pendulum', 'pendulum-1'].map("
         "  id => document.getElementById(id).getBoundingClientRect().top)"
@@ -71,8 +73,9 @@ def test_names_lines_and_q_values_belong_to_their_network(duel: str, player: Pla
 
 
 def test_another_gravity_than_in_training_is_said_above_the_pendulum(
-    player: Player, tmp_path: Path
+    player: Player, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    coarse_optimum(monkeypatch)
     out = tmp_path / "page.html"
     for words, title in (
         (["reference", "--gravity", "5"], "Pendulum at g = 5 m/s², trained at 1"),
@@ -86,7 +89,7 @@ def test_another_gravity_than_in_training_is_said_above_the_pendulum(
 
 def test_page_sends_no_network_requests(pages: dict[str, str], player: Player) -> None:
     player.open(pages["small"])
-    player.wait(lambda: player.run("return pendulum.page.map.ready"))
+    wait_for(lambda: player.run("return pendulum.page.map.ready"))
     assert player.run("return performance.getEntriesByType('resource').length") == 0
     log = "".join(entry["message"] for entry in player.log("performance"))
     requested = re.findall(r'"method":"Network.requestWillBeSent".*?"url":"(.*?)"', log)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT, Command, Refusal
+from page_fixtures import coarse_optimum
 
 import keras_pendulum as kp
 from keras_pendulum.page import __main__ as page_command
@@ -17,10 +18,11 @@ RECORDED = ROOT / "weights" / "original.h5"
 
 
 def test_command_writes_one_small_file_and_prints_its_address(
-    command: Command, tmp_path: Path
+    command: Command, in_process: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    coarse_optimum(monkeypatch)
     out = tmp_path / "pendulum.html"
-    assert page_command.main(["reference", "--out", str(out)]) == 0
+    assert in_process("page", "reference").returncode == 0
     first_page = out.read_bytes()
     done = command("page", "reference", "--gravity", "10")
     assert (done.returncode, done.stderr) == (0, "")

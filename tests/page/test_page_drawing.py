@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ from numpy.typing import NDArray
 from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
-from keras_pendulum.environments.tasks import make_environment
+from keras_pendulum.environments.pendulum import Pendulum
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.8, -2.0, 3.0])
@@ -24,7 +22,7 @@ def test_pendulum_points_where_gymnasium_draws_it(
     player.press(Keys.SPACE)
     player.run("pendulum.reset(arguments[0], 0)", theta)
     rod = pixels_of(player, "pendulum", "rod")
-    env: Any = make_environment("Pendulum-v1", 1.0, render_mode="rgb_array")
+    env: Any = Pendulum().make_env(render_mode="rgb_array")
     env.reset(seed=0)
     env.unwrapped.state = np.array([theta, 0.0])
     gymnasium_rod = (env.render() == [204, 77, 77]).all(axis=-1)
@@ -68,20 +66,14 @@ def test_every_torque_has_a_bar_and_the_highest_is_the_greedy_one(
     assert state["best"] == q.argmax()
     assert tops[state["best"]] == tops.min()  # another bar may have the same height in pixels
     lowest = player.run("return pendulum.page.view.floor")
-    scale = reward_scale(kp.find_weights("swingup"))
+    scale = kp.load_policy("swingup").info.reward_scale
     heights = 1 - (q - q.max()) / scale / lowest
     floor = picture.shape[0] - 38 - 4 - 13  # a bar for the lowest value has 4 px
     np.testing.assert_allclose(1 - (tops + 1) / (floor + 1), heights, atol=0.03)
     value = player.text("best").split(": ")[1].replace("−", "-")
     assert float(value) == pytest.approx(
-        q.max() / reward_scale(kp.find_weights("swingup")), abs=0.01
+        q.max() / kp.load_policy("swingup").info.reward_scale, abs=0.01
     )
-
-
-def reward_scale(path: Path) -> float:
-    """Returns the factor on the rewards in the settings that a weights file records."""
-    config = json.loads(kp.load_weights(path).provenance.config or "{}")
-    return float(config["reward_scale"])
 
 
 def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import Player
+from conftest import wait_for
 from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import TorqueGrid
-from keras_pendulum.environments.tasks import make_environment, pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
 
 TOLERANCE = 1e-4
 
@@ -27,7 +28,7 @@ def test_200_steps_agree_with_gymnasium_and_keras(
 ) -> None:
     network = kp.load_weights(files[name])
     policy, grid = greedy_policy(network), TorqueGrid(network.action_count)
-    env = make_environment("Pendulum-v1", float(gravity))
+    env = Pendulum(float(gravity)).make_env()
     player.open(pages[name])
     player.press(Keys.SPACE)
     ties = 0
@@ -66,7 +67,7 @@ def test_200_steps_agree_with_gymnasium_and_keras(
 def test_torques_of_keys_act_as_in_gymnasium(pages: dict[str, str], player: Player) -> None:
     player.open(pages["small"])
     player.press(Keys.SPACE)
-    env = make_environment("Pendulum-v1", 3.5)
+    env = Pendulum(3.5).make_env()
     env.reset(seed=5)
     pendulum: Any = env.unwrapped
     player.run("pendulum.reset(arguments[0], arguments[1])", *pendulum.state.tolist())
@@ -111,7 +112,7 @@ def test_optimum_of_a_start_is_the_exact_one(
 def test_map_switches_to_the_optimum(pages: dict[str, str], player: Player) -> None:
     player.open(pages["reference"])
     player.press(Keys.SPACE, "m")
-    player.wait(lambda: player.run("return pendulum.page.layer === 2 && pendulum.page.map.ready"))
+    wait_for(lambda: player.run("return pendulum.page.layer === 2 && pendulum.page.map.ready"))
     size = player.run("return pendulum.page.map.size")
     found = np.array(player.run("return Array.from(pendulum.page.map.torques)"))
     found = found.reshape(size, size)

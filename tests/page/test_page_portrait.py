@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from browser import Player, pixels_of
+from conftest import wait_for
 from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
@@ -22,7 +23,7 @@ def test_map_shows_the_greedy_torque_of_every_state(
     policy, grid = greedy_policy(network), TorqueGrid(network.action_count)
     player.open(pages["small"])
     player.press(Keys.SPACE)
-    player.wait(lambda: player.run("return pendulum.page.map.ready"))
+    wait_for(lambda: player.run("return pendulum.page.map.ready"))
     size = player.run("return pendulum.page.map.size")
     theta, thetadot = np.meshgrid(np.linspace(-np.pi, np.pi, size), np.linspace(8, -8, size))
     observations = np.stack([np.cos(theta), np.sin(theta), thetadot], axis=-1).astype(np.float32)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import SCREENS, Player
+from conftest import wait_for
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 from selenium.webdriver.common.actions.pointer_input import PointerInput
@@ -34,7 +35,7 @@ def test_dragging_turns_the_pendulum_and_starts_an_episode_there(
     state = player.state()
     assert state["theta"] == pytest.approx(np.pi / 2, abs=0.05)  # on the left is positive
     assert (state["thetadot"], state["steps"], state["return"]) == (0, 0, 0)
-    player.wait(lambda: player.text("optimum").startswith("−"))
+    wait_for(lambda: player.text("optimum").startswith("−"))
     player.press("s")
     assert player.state()["steps"] == 1
 
@@ -47,7 +48,7 @@ def test_a_flick_pushes_the_pendulum(pages: dict[str, str], player: Player) -> N
     player.mouse("mousePressed", (x, y - 60), now)
     player.mouse("mouseMoved", (x - 20, y - 57), now + 0.03)
     player.mouse("mouseReleased", (x - 20, y - 57), now + 0.03)
-    player.wait(lambda: not player.run("return pendulum.page.held"))
+    wait_for(lambda: not player.run("return pendulum.page.held"))
     assert 0 < player.state()["thetadot"] <= 8
     speed = (
         "const t = new Touch(() => {}); t.moves = arguments[0]; return t.flickSpeed(arguments[1])"
@@ -57,30 +58,38 @@ def test_a_flick_pushes_the_pendulum(pages: dict[str, str], player: Player) -> N
     assert player.run(speed, [[1, 0], [1.05, 0.1]], 2) == 0  # held still before the release
 
 
-@pytest.mark.parametrize(("width", "height"), SCREENS)
 @pytest.mark.parametrize("finger", ["mouse", "touch"])
-def test_a_press_on_the_portrait_chooses_the_state(
-    finger: str, width: int, height: int, duel: str, player: Player
+@pytest.mark.parametrize("places", [[0.75], [0.5, 0.75]], ids=["press", "drag"])
+def test_a_press_and_a_drag_on_the_portrait_choose_the_state(
+    places: list[float], finger: str, duel: str, player: Player
 ) -> None:
-    player.set_screen(width, height)
     player.open(duel)
     player.press(Keys.SPACE)
-    from_middle = player.run(
-        "const c = document.getElementById('portrait'); c.scrollIntoView({block: 'center'});"
-        "const {width, height} = c.getBoundingClientRect();"
-        "const [left, right, top, bottom] = portraitEdges(width, height);"
-        "return [0.25 * left + 0.75 * right - width / 2, 0.75 * top + 0.25 * bottom - height / 2]"
-    )
-    pointer = PointerInput(finger, finger)  # type: ignore[no-untyped-call]
-    press = ActionBuilder(player.driver, mouse=pointer, duration=0)
-    action: Any = press.pointer_action
-    action.move_to(player.find("portrait"), *map(round, from_middle)).pointer_down().pointer_up()
-    press.perform()
-    found = player.run("return pendulum.page.episodes.map(e => [e.theta, e.thetadot])")
-    np.testing.assert_allclose(found[0], [np.pi / 2, 4], atol=0.1)
-    assert found[0] == found[1]
-    player.press("h")
-    assert player.run("return pendulum.page.episodes.map(e => e.theta)") == [np.pi, np.pi]
+    for width, height in SCREENS:
+        player.set_screen(width, height)
+        from_middle = player.run(
+            "const c = document.getElementById('portrait'); c.scrollIntoView({block: 'center'});"
+            "const {width, height} = c.getBoundingClientRect();"
+            "const [left, right, top, bottom] = portraitEdges(width, height);"
+            "return arguments[0].map(x => [(1 - x) * left + x * right - width / 2,"
+            "  x * top + (1 - x) * bottom - height / 2])",
+            places,
+        )
+        pointer = PointerInput(finger, finger)  # type: ignore[no-untyped-call]
+        actions = ActionBuilder(player.driver, mouse=pointer, duration=0)
+        action: Any = actions.pointer_action
+        portrait = player.find("portrait")
+        action.move_to(portrait, *map(round, from_middle[0])).pointer_down()
+        for place in from_middle[1:]:
+            action.move_to(portrait, *map(round, place))
+        action.pointer_up()
+        actions.perform()
+        wait_for(lambda: not player.run("return pendulum.page.held"))
+        found = player.run("return pendulum.page.episodes.map(e => [e.theta, e.thetadot])")
+        np.testing.assert_allclose(found[0], [np.pi / 2, 4], atol=0.1)
+        assert found[0] == found[1]
+        player.press("h")
+        assert player.run("return pendulum.page.episodes.map(e => e.theta)") == [np.pi, np.pi]
 
 
 def middle_of(player: Player, id: str) -> tuple[float, float]:
@@ -115,10 +124,10 @@ def test_a_finger_turns_and_flicks_the_pendulum(
     now = time.time()
     player.finger("touchStart", (x, y - 50), now)
     player.finger("touchMove", (x - 50, y), now + 1)
-    player.wait(lambda: player.run("return pendulum.page.held"))
+    wait_for(lambda: player.run("return pendulum.page.held"))
     player.finger("touchMove", (x, y + 50), now + 2)
     player.finger("touchEnd", (x, y + 50), now + 3)
-    player.wait(lambda: not player.run("return pendulum.page.held"))
+    wait_for(lambda: not player.run("return pendulum.page.held"))
     state = player.state()
     assert abs(state["theta"]) == pytest.approx(np.pi, abs=0.05)
     assert (state["thetadot"], state["steps"]) == (0, 0)  # held still before the release
@@ -128,35 +137,9 @@ def test_a_finger_turns_and_flicks_the_pendulum(
     for i in range(1, 6):
         player.finger("touchMove", (x - 4 * i, y - 50), now + 0.016 * i)
     player.finger("touchEnd", (x - 20, y - 50), now + 0.09)
-    player.wait(lambda: not player.run("return pendulum.page.held"))
+    wait_for(lambda: not player.run("return pendulum.page.held"))
     assert player.state()["theta"] == pytest.approx(np.arctan2(20, 50), abs=0.05)
     assert 2 < player.state()["thetadot"] <= 8
-
-
-@pytest.mark.parametrize(("width", "height"), SCREENS)
-def test_a_finger_chooses_a_state_on_the_portrait(
-    width: int, height: int, pages: dict[str, str], fingers: Player
-) -> None:
-    player = fingers
-    player.set_screen(width, height)
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
-    x, y = middle_of(player, "portrait")
-    left, right, top, bottom = player.run(
-        "const c = document.getElementById('portrait');"
-        "return portraitEdges(c.clientWidth, c.clientHeight)"
-    )
-    now = time.time()
-    player.finger("touchStart", (x, y), now)
-    player.finger("touchMove", (x + 40, y - 20), now + 0.1)
-    player.finger("touchEnd", (x + 40, y - 20), now + 0.2)
-    player.wait(lambda: not player.run("return pendulum.page.held"))
-    state = player.state()
-    theta = (18 + 40) / (right - left) * 2 * np.pi  # the axes are not in the middle of the canvas
-    theta -= 36 / (right - left) * 2 * np.pi
-    assert state["theta"] == pytest.approx(theta, abs=0.1)
-    speed = (20 + 16) / (bottom - top) * 16 - 32 / (bottom - top) * 16
-    assert state["thetadot"] == pytest.approx(speed, abs=0.3)
 
 
 def test_arrows_on_the_focused_portrait_choose_any_state(

@@ -12,19 +12,19 @@ from urllib.request import url2pathname
 import numpy as np
 import pytest
 from browser import SCREENS, Player, pixels_of
-from conftest import Refusal
+from conftest import Refusal, wait_for
+from page_fixtures import coarse_optimum
 from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
-from keras_pendulum.dqn.network import Provenance
 from keras_pendulum.page import __main__ as page_command
-from keras_pendulum.page import build
 from keras_pendulum.page.training import _encode, training_content
+from keras_pendulum.storage.recorded_run import load_recorded_run
+from keras_pendulum.storage.run_folder import find_run
 from keras_pendulum.storage.snapshots import read_snapshots
-from keras_pendulum.train.checkpoint import load_history
 
 CONFIG = kp.preset(
-    "reference", episodes=8, snapshots=5, hidden_units=(16, 8), warmup_episodes=1, gravity=2.5
+    "reference", episodes=8, snapshots=5, hidden_units=(16, 8), warmup_episodes=1, gravity=10.0
 )
 
 
@@ -32,8 +32,8 @@ CONFIG = kp.preset(
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run with the networks after 0, 2, 4, 6 and 8 episodes."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("keras_pendulum.train.train_dqn.run_phase_planes", lambda *run: {})
-        patched.setattr("keras_pendulum.train.run_figure.draw_run", lambda *run: b"a picture")
+        patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
+        patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
         folder = tmp_path_factory.mktemp("runs") / "my run"
         kp.train_dqn(CONFIG, folder)
     return folder
@@ -44,7 +44,7 @@ def page(run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     """The address of the run's page."""
     out = tmp_path_factory.mktemp("page") / "page.html"
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(build, "THETA_CELLS", 50)  # the optimum is tested elsewhere
+        coarse_optimum(patched)
         assert page_command.main([str(run), "--out", str(out)]) == 0
     return out.as_uri()
 
@@ -62,7 +62,7 @@ def test_slider_shows_each_network_of_the_run(run: Path, page: str, player: Play
     player.find("snapshot").send_keys(Keys.HOME)
     assert shown_episode(player) == "episode 0 of 8"
     final = kp.load_weights(run / "pendulum_weight.h5")
-    _, history = load_history(run / "pendulum_weight.h5")
+    history = load_recorded_run(run / "pendulum_weight.h5").history
     observation = [np.cos(2.0), np.sin(2.0), 0.5]
     values = []
     for each in read_snapshots(run / "pendulum_weight_snapshots.h5", final, history):
@@ -115,7 +115,7 @@ def test_map_and_cursor_move_with_the_slider(run: Path, page: str, player: Playe
     maps = []
     for index in (4, 1, 4):
         player.run("pendulum.page.training.show(arguments[0])", index)
-        player.wait(lambda: player.run("return pendulum.page.map.ready"))
+        wait_for(lambda: player.run("return pendulum.page.map.ready"))
         maps.append(player.run("return Array.from(pendulum.page.map.torques)"))
         if index == 1:
             ink = pixels_of(player, "curve", "ink")
@@ -144,15 +144,15 @@ def test_a_key_plays_the_training_from_its_start(page: str, player: Player) -> N
     for index in (1, 2):
         player.run("pendulum.page.training.seconds = 3")
         player.run("window.expected = arguments[0]", index)
-        player.wait(lambda: player.run("return pendulum.page.training.shown === expected"))
+        wait_for(lambda: player.run("return pendulum.page.training.shown === expected"))
     player.press(Keys.SPACE)  # the pause stops it
     assert player.text("play-training").startswith("Play training")
     player.find("play-training").click()
     assert player.run("return pendulum.page.training.shown") == 2
     for _ in range(3):
         player.run("pendulum.page.training.seconds = 3")
-        player.wait(lambda: player.run("return pendulum.page.training.seconds") < 3)
-    player.wait(lambda: not player.run("return pendulum.page.training.playing"))
+        wait_for(lambda: player.run("return pendulum.page.training.seconds") < 3)
+    wait_for(lambda: not player.run("return pendulum.page.training.playing"))
     assert shown_episode(player) == "episode 8 of 8"
 
 
@@ -161,28 +161,27 @@ def test_training_plays_without_motion_for_reduced_motion(page: str, player: Pla
     player.open(page)
     player.press("p")
     player.run("pendulum.page.training.seconds = 3")
-    player.wait(lambda: shown_episode(player) == "episode 2 of 8")
+    wait_for(lambda: shown_episode(player) == "episode 2 of 8")
     assert player.text("status") == "Paused. The network drives."
     assert player.state()["steps"] == 0
 
 
-@pytest.mark.parametrize(("width", "height"), SCREENS)
-def test_slider_is_visible_with_the_pendulum(
-    width: int, height: int, page: str, player: Player
-) -> None:
-    player.set_screen(width, height)
+def test_slider_is_visible_with_the_pendulum(page: str, player: Player) -> None:
     player.open(page)
-    ids = ["pair", "training", "snapshot", "curve", "play-training"]
-    ids += ["phase"] if width != 844 else []
-    boxes = player.run(
-        "return arguments[0].map(id => document.getElementById(id).getBoundingClientRect())"
-        ".map(r => [r.top, r.bottom, r.left, r.right])",
-        ids,
-    )
-    for top, bottom, left, right in boxes:
-        assert 0 <= top < bottom <= height and 0 <= left < right <= width
-    training, pair = boxes[1], boxes[0]
-    assert pair[1] <= training[0]  # the slider covers nothing of the pendulum
+    for width, height in SCREENS:
+        player.set_screen(width, height)
+        player.redraw()
+        ids = ["pair", "training", "snapshot", "curve", "play-training"]
+        ids += ["phase"] if width != 844 else []
+        boxes = player.run(
+            "return arguments[0].map(id => document.getElementById(id).getBoundingClientRect())"
+            ".map(r => [r.top, r.bottom, r.left, r.right])",
+            ids,
+        )
+        for top, bottom, left, right in boxes:
+            assert 0 <= top < bottom <= height and 0 <= left < right <= width
+        training, pair = boxes[1], boxes[0]
+        assert pair[1] <= training[0]  # the slider covers nothing of the pendulum
 
 
 def test_page_without_snapshots_has_no_slider(pages: dict[str, str], player: Player) -> None:
@@ -194,9 +193,9 @@ def test_page_without_snapshots_has_no_slider(pages: dict[str, str], player: Pla
 
 def test_learning_curve_is_the_mean_of_ten_episodes(run: Path) -> None:
     checkpoint = run / "pendulum_weight.h5"
-    content = training_content(checkpoint, kp.load_weights(checkpoint))
+    content = training_content(find_run(run), kp.load_weights(checkpoint))
     assert content is not None
-    _, history = load_history(checkpoint)
+    history = load_recorded_run(checkpoint).history
     rewards = [record.average_reward for record in history]
     means = [np.mean(rewards[: count + 1]) for count in range(8)]  # fewer than 10 so far
     np.testing.assert_allclose(content["curve"], means, rtol=1e-3)
@@ -205,10 +204,8 @@ def test_learning_curve_is_the_mean_of_ten_episodes(run: Path) -> None:
 def test_run_without_snapshots_has_a_page_and_a_hint(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(build, "THETA_CELLS", 50)
-    kp.save_weights(
-        kp.DQN((8,), provenance=Provenance(gravity=7.0)), tmp_path / "pendulum_weight.h5"
-    )
+    coarse_optimum(monkeypatch)
+    kp.save_weights(kp.DQN((8,), metadata={"gravity": 7.0}), tmp_path / "pendulum_weight.h5")
     out = tmp_path / "page.html"
     assert page_command.main([str(tmp_path), "--out", str(out)]) == 0
     assert "There is no slider: the run has no snapshots" in capsys.readouterr().out

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.compare.curve_style import STYLES
+from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.errors import ConfigError
-from keras_pendulum.study.arms import default_arms, own_arms
+from keras_pendulum.figures.curves import STYLES
+from keras_pendulum.study.arms import default_arms, describe_setting, own_arms
 
 
 def test_default_study_goes_from_original_to_reference_one_change_at_a_time() -> None:
@@ -41,9 +43,14 @@ def test_each_curve_of_the_default_study_has_its_own_colour() -> None:
     assert len([arm for arm in default_arms() if arm.has_curve]) <= len(STYLES)
 
 
-def test_arms_that_differ_only_in_save_every_share_their_runs() -> None:
+def test_arms_that_differ_only_in_their_preset_share_their_runs() -> None:
     one, two, three = own_arms(
-        ["reference"], ["seldom: reference save_every=7", "less: reference discount=0.5"]
+        ["reference"],
+        [
+            "fixed: original max_episode_steps=100 replay_capacity=14000 updates_per_episode=40 "
+            "learning_rate_schedule=cosine target_update=soft",
+            "less: reference discount=0.5",
+        ],
     )
     assert one.config != two.config
     assert one.training_config == two.training_config != three.training_config
@@ -57,32 +64,22 @@ def test_own_arm_is_a_preset_with_settings() -> None:
     assert (one.baseline, two.baseline, three.baseline) == (None, None, "reference")
 
 
-def test_arm_with_a_name_of_64_letters_is_accepted() -> None:
-    (arm,) = own_arms([], [f"{'n' * 64}: original"])
-    assert arm.slug == "n" * 64
-
-
-@pytest.mark.parametrize("name", ["con", "NUL", "aux", "Prn", "com1", "lpt9.5", "nul.", "com0 "])
-def test_arm_with_a_name_that_windows_reserves_has_another_one_in_file_names(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "slug"),
+    [
+        *((name, f"arm-{name}") for name in ("con", "aux", "com1", "lpt9.5")),
+        ("NUL", "arm-nul"),
+        ("Prn", "arm-prn"),
+        ("nul.", "arm-nul"),
+        ("com0 ", "arm-com0"),
+        *((name, name) for name in ("console", "nul-1", "com", "com10", "a.con", "prn1")),
+        ("n" * 64, "n" * 64),
+        ('a<b>c"d|e?f*g/h\\i. . ', "a-b-c-d-e-f-g-h-i"),
+    ],
+)
+def test_name_of_an_arm_in_file_names_is_allowed_on_windows(name: str, slug: str) -> None:
     (arm,) = own_arms([], [f"{name}: original"])
-    assert arm.name == name.strip()
-    assert arm.slug == f"arm-{name.lower().strip(' .')}"
-
-
-@pytest.mark.parametrize("name", ["console", "nul-1", "com", "com10", "a.con", "prn1"])
-def test_arm_with_a_name_that_windows_allows_keeps_it_in_file_names(name: str) -> None:
-    (arm,) = own_arms([], [f"{name}: original"])
-    assert arm.slug == name
-
-
-def test_arm_with_letters_that_windows_forbids_has_others_in_file_names() -> None:
-    (arm,) = own_arms([], ['a<b>c"d|e?f*g/h\\i. . : original'])
-    assert arm.slug == "a-b-c-d-e-f-g-h-i"
-
-
-def test_reserved_name_and_its_replacement_are_two_arms_of_one_name() -> None:
-    with pytest.raises(ConfigError, match="two arms have the name"):
-        own_arms([], ["con: original", "arm-con: reference"])
+    assert (arm.name, arm.slug) == (name.strip(), slug)
 
 
 @pytest.mark.parametrize(
@@ -93,15 +90,17 @@ def test_reserved_name_and_its_replacement_are_two_arms_of_one_name() -> None:
         ("a: refrence", "did you mean reference"),
         ("a: reference colour=red", "unknown setting colour$"),
         ("a: reference batchsize=8", "unknown setting batchsize; did you mean batch_size"),
-        ("a: reference environment=CartPole-v1", "take the preset cartpole"),
+        ("a: reference environment=CartPole-v1", "take one of the presets cartpole-original"),
         ("a: reference episodes=ten", "episodes is 'ten'; expected a whole number"),
         ("a: reference episodes=-1", "episodes is -1"),
         ("a: reference episodes", "expected field=value"),
         ("a: reference seed=3", "cannot set seed"),
         ("a: reference evaluate_every=50", "cannot set evaluate_every: a study evaluates each run"),
+        ("a: reference save_every=7", "cannot set save_every: .* saves no weights$"),
         ("a: reference keep_best=true", "cannot set keep_best"),
         ("a: reference snapshots=20", "cannot set snapshots"),
         ("reference: original", "two arms have the name"),
+        ("Reference?: original", "two arms have the name"),
         (f"{'n' * 65}: original", "longer than 64 letters"),
     ],
 )
@@ -109,3 +108,30 @@ def test_wrong_arm_is_a_config_error_of_one_line(text: str, message: str) -> Non
     with pytest.raises(ConfigError, match=message) as caught:
         own_arms(["reference"], [text])
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("updates_per_episode", 1, "one update per episode"),
+        ("updates_per_episode", 30, "30 updates per episode"),
+        ("target_update", "none", "no target network"),
+        ("hidden_units", (64, 64), "layers of 64, 64"),
+        ("average_updates", 1500, "weights averaged over 1500 updates"),
+        ("average_updates", 1, "no average of the weights"),
+        ("double_q", True, "double Q-learning"),
+        ("gradient_clip", None, "gradient clip none"),  # a setting without words of its own
+    ],
+)
+def test_setting_is_described_in_words(name: str, value: Any, words: str) -> None:
+    assert describe_setting(name, value) == words
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_setting_of_a_preset_has_a_description(preset: str) -> None:
+    for spec in fields(kp.Config):
+        words = describe_setting(spec.name, getattr(PRESETS[preset], spec.name))
+        assert words
+        assert "_" not in words.replace("_uniform", "")

@@ -15,10 +15,11 @@ from functools import partial
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
+from typing import Any
 
 import psutil
 import pytest
-from conftest import TESTS, running_module
+from conftest import TESTS, environment_restored, running_module, wait_for
 
 from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
@@ -31,18 +32,12 @@ IMPORTED_FROM = [str(TESTS), str(Path(__file__).parent)]  # workers unpickle fun
 
 
 @pytest.fixture(autouse=True)
-def restored_environment() -> Iterator[None]:
-    before = dict(os.environ)
-    yield
-    os.environ.clear()
-    os.environ.update(before)
-
-
-def wait_for(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + 60
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+def patient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Lets a busy machine start its workers; restores the environment."""
+    monkeypatch.setattr(dask_workers, "_ANSWER_SECONDS", 600)
+    monkeypatch.setattr(dask_workers, "_FIRST_WORKER_SECONDS", 600)
+    with environment_restored():
+        yield
 
 
 def make_job(seed: int) -> Job:
@@ -63,35 +58,26 @@ def kill_worker_of_seed_0(attempts: Path, failures: int, job: Job) -> Reply:
     return describe_worker(job)
 
 
-def wait_a_minute(started: Path, job: Job) -> Reply:
+def never_end(started: Path, job: Job) -> Reply:
     started.touch()
-    time.sleep(60)
-    return describe_worker(job)
+    while True:
+        time.sleep(1)
 
 
-def test_killed_worker_is_reported_and_replaced_and_its_job_repeated(tmp_path: Path) -> None:
-    work = partial(kill_worker_of_seed_0, tmp_path / "attempts", 1)
-    lines: list[str] = []
-    with local_workers(1) as client:
-        finished = list(run_all(client, work, map(make_job, range(2)), lines.append))
-    assert len([each for each in finished if each.reply]) == 2
-    assert (tmp_path / "attempts").read_text() == "xx"
-    (line,) = lines
-    assert re.fullmatch(r"lost the worker tcp://127.0.0.1:\d+, interrupting arm, seed 0", line)
-
-
-def test_job_that_kills_every_worker_fails_after_three_attempts_and_no_other_job(
-    tmp_path: Path,
+@pytest.mark.parametrize("failures", [1, 99])
+def test_job_of_a_killed_worker_is_repeated_up_to_three_times_and_no_other_job(
+    failures: int, tmp_path: Path
 ) -> None:
-    work = partial(kill_worker_of_seed_0, tmp_path / "attempts", 99)
+    work = partial(kill_worker_of_seed_0, tmp_path / "attempts", failures)
     lines: list[str] = []
     with local_workers(1) as client:
         finished = list(run_all(client, work, map(make_job, range(3)), lines.append))
     problems = {each.job.config.seed: each.problem for each in finished}
-    assert problems == {0: "it lost its worker 3 times", 1: "", 2: ""}
-    assert (tmp_path / "attempts").read_text() == "xxx"
-    assert len(lines) == 3
-    assert all(line.endswith(", interrupting arm, seed 0") for line in lines)
+    assert problems == {0: "" if failures == 1 else "it lost its worker 3 times", 1: "", 2: ""}
+    assert len((tmp_path / "attempts").read_text()) == (2 if failures == 1 else 3)
+    assert len(lines) == min(failures, 3)
+    for line in lines:
+        assert re.fullmatch(r"lost the worker tcp://127.0.0.1:\d+, interrupting arm, seed 0", line)
 
 
 def listening_sockets() -> set[tuple[str, int]]:
@@ -124,14 +110,12 @@ def test_workers_on_windows_ignore_control_c(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_end_of_local_workers_does_not_wait_for_their_jobs(tmp_path: Path) -> None:
-    work = partial(wait_a_minute, tmp_path / "started")
+    work = partial(never_end, tmp_path / "started")
     before = psutil.Process().children()
     with local_workers(1) as client:
         future = client.submit(work, make_job(0))
         wait_for((tmp_path / "started").exists)
-        started = time.monotonic()
         del future
-    assert time.monotonic() - started < 20
     remaining = [child for child in psutil.Process().children() if child not in before]
     assert not [child for child in remaining if "spawn_main" in " ".join(child.cmdline())]
 
@@ -172,12 +156,13 @@ def refusal(address: str, versions: dict[str, str]) -> str:
 def test_unsuitable_cluster_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     versions = installed_versions()
     with running_scheduler(tmp_path) as (_, address):
-        monkeypatch.setattr(dask_workers, "_FIRST_WORKER_SECONDS", 0.1)
-        assert refusal(address, versions) == (
+        with monkeypatch.context() as impatient:
+            impatient.setattr(dask_workers, "_FIRST_WORKER_SECONDS", 0.1)
+            message = refusal(address, versions)
+        assert message == (
             f"the scheduler at {address} has no worker: start some with "
             f"`dask worker {address} --nthreads 1 --nworkers N`"
         )
-        monkeypatch.undo()
         with running_worker(address, threads=2):
             assert "has 2 threads: start workers with --nthreads 1" in refusal(address, versions)
         with running_worker(address):
@@ -189,7 +174,7 @@ def test_unsuitable_cluster_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_scheduler_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dask_workers, "_ANSWER_SECONDS", 0.2)
+    monkeypatch.setattr(dask_workers, "_ANSWER_SECONDS", 0.2)  # nobody could answer later
     for address in ("tcp://127.0.0.1:1", "no such place"):
         assert refusal(address, {}).startswith(f"no scheduler answers at {address}: start one")
 
@@ -200,7 +185,7 @@ def test_lost_scheduler_is_noticed_while_no_job_finishes(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    work = partial(wait_a_minute, tmp_path / "started")
+    work = partial(never_end, tmp_path / "started")
     lines: list[str] = []
     with running_scheduler(tmp_path) as (scheduler, address), running_worker(address):
 
@@ -220,38 +205,34 @@ def test_lost_scheduler_is_noticed_while_no_job_finishes(
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize(
-    "moment", ["_require_one_thread", "_require_same_versions", "the dashboard", "the last run"]
-)
-def test_scheduler_lost_between_two_runs_or_before_the_first_is_one_error(
+@pytest.mark.parametrize("moment", ["before the first run", "after the last run"])
+def test_scheduler_lost_while_no_job_runs_is_one_error(
     moment: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    versions = installed_versions()
+    check = dask_workers._require_same_versions
     with running_scheduler(tmp_path) as (scheduler, address), running_worker(address):
 
-        def stop_scheduler() -> None:
+        def stop_scheduler(client: Any) -> None:
+            client._timeout = 0  # of the attempts to connect again
             scheduler.kill()
             scheduler.wait()
 
-        if moment.startswith("_"):
-            check = getattr(dask_workers, moment)
+        def check_without_scheduler(client: Any, versions: dict[str, str]) -> None:
+            stop_scheduler(client)
+            check(client, versions)
 
-            def check_without_scheduler(*arguments: object) -> None:
-                stop_scheduler()
-                check(*arguments)
-
-            monkeypatch.setattr(dask_workers, moment, check_without_scheduler)
-        with pytest.raises(UserError) as caught, cluster_workers(address, versions) as client:
-            if moment == "the dashboard":
-                stop_scheduler()
-                dashboard(client)
-            elif moment == "the last run":
-                assert len(list(run_all(client, describe_worker, [make_job(0)]))) == 1
-                stop_scheduler()
-                client.nthreads()
+        if moment == "before the first run":
+            monkeypatch.setattr(dask_workers, "_require_same_versions", check_without_scheduler)
+        with (
+            pytest.raises(UserError) as caught,
+            cluster_workers(address, installed_versions()) as client,
+        ):
+            assert len(list(run_all(client, describe_worker, [make_job(0)]))) == 1
+            stop_scheduler(client)
+            client.nthreads()
     assert str(caught.value) == str(lost_scheduler(address))
     assert capfd.readouterr() == ("", "")
 
@@ -286,38 +267,26 @@ def test_other_error_is_not_reported_as_a_lost_scheduler(tmp_path: Path) -> None
         client.run(lambda: 1 / 0)
 
 
-# A test that is killed while it has a scheduler, a worker of it, and a worker of this machine.
+# A test that is killed while it has a process.
 KILLED = """
-import os, signal, sys, time
-from pathlib import Path
-from test_dask_workers import running_scheduler, running_worker
-from keras_pendulum.study.dask_workers import local_workers
+import sys, time
+from conftest import running_module
 
-with (
-    running_scheduler(Path(sys.argv[1])) as (_, address),
-    running_worker(address),
-    local_workers(1),
-):
-    print("ready", flush=True)
+with running_module("http.server", "--bind", "127.0.0.1", "0") as process:
+    print(process.pid, flush=True)
     time.sleep(600)
 """
 
 
-def test_killed_test_leaves_no_process_behind(tmp_path: Path) -> None:
-    folders = [*IMPORTED_FROM, *sys.path]
+def test_killed_test_leaves_no_process_behind() -> None:
     with subprocess.Popen(
-        [sys.executable, "-c", KILLED, str(tmp_path)],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))},
+        [sys.executable, "-c", KILLED],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([*IMPORTED_FROM, *sys.path])},
         stdout=subprocess.PIPE,
         text=True,
     ) as killed:
         assert killed.stdout is not None
-        assert killed.stdout.readline() == "ready\n"
-        children = psutil.Process(killed.pid).children(recursive=True)
+        child = int(killed.stdout.readline())
+        assert psutil.pid_exists(child)
         killed.kill()
-    assert len(children) >= 3
-    _, alive = psutil.wait_procs(children, 60)
-    left = [child for child in alive if child.status() != psutil.STATUS_ZOMBIE]
-    for child in left:
-        child.kill()
-    assert left == []
+        killed.communicate()  # ends when the child, which has inherited the output, has ended

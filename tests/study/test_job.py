@@ -52,22 +52,78 @@ def test_curve_points_are_means_of_ten_episodes_and_of_the_rest() -> None:
 
 LOWEST = -(math.pi**2 + 6.4 + 0.004)  # reward of a step
 PENDULUM = Job("arm", "arm", preset("reference", episodes=11, max_episode_steps=100), {})
+PENDULUM_RESULT = RunResult(-40.0, [-41.5] * 100, [-1.0] * 2, [-100.0] * 2, [1.5] * 5)
 POLE = Job("pole", "pole", preset("cartpole", episodes=11), {})
-PENDULUM_RESULT = RunResult(-40.0, [-41.5] * 100, [-1.0] * 2, [-100.0] * 2)
-POLE_RESULT = RunResult(500.0, [499.0] * 100, [1.0] * 2, [20.0] * 2)
+POLE_RESULT = RunResult(500.0, [499.0] * 100, [1.0] * 2, [20.0] * 2, [1.0] * 5)
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("job", "field", "count", "low", "high"),
     [
-        {"optimal_mean_return": 0.0, "returns": [200 * LOWEST] * 100},
-        {"optimal_mean_return": 200 * LOWEST, "returns": [0.0] * 100},
-        {"average_rewards": [LOWEST, 0.0], "episode_returns": [100 * LOWEST, 0.0]},
+        (PENDULUM, "optimal_mean_return", 1, 200 * LOWEST, 0.0),
+        (PENDULUM, "returns", 100, 200 * LOWEST, 0.0),
+        (PENDULUM, "average_rewards", 2, LOWEST, 0.0),
+        (PENDULUM, "episode_returns", 2, 100 * LOWEST, 0.0),
+        (PENDULUM, "greedy_regrets", 5, 200 * LOWEST, -200 * LOWEST),
+        (POLE, "returns", 100, 0.0, 500.0),
+        (POLE, "average_rewards", 2, 0.0, 1.0),
+        (POLE, "episode_returns", 2, 0.0, 500.0),
     ],
 )
-def test_numbers_at_the_limits_are_valid(changes: dict[str, Any]) -> None:
-    result = PENDULUM_RESULT._replace(**changes)
-    assert decode(encode(PENDULUM, result), PENDULUM) == result
+def test_numbers_that_no_run_can_have_are_refused_despite_their_checksum(
+    job: Job, field: str, count: int, low: float, high: float
+) -> None:
+    def is_valid(numbers: list[Any]) -> bool:
+        change: dict[str, Any] = {field: numbers[0] if field == "optimal_mean_return" else numbers}
+        result = (PENDULUM_RESULT if job is PENDULUM else POLE_RESULT)._replace(**change)
+        return decode(encode(job, result), job) == result
+
+    assert is_valid([low] * count)
+    assert is_valid([high] * count)
+    for wrong in (low - 0.001, high + 0.001, math.nan, -math.inf, False):
+        assert not is_valid([wrong] + [low] * (count - 1))
+    if field in ("average_rewards", "episode_returns", "greedy_regrets"):
+        for numbers in ([None] * count, ["1"] * count, []):
+            assert not is_valid(numbers)
+    if count > 1:
+        assert not is_valid([low] * (count - 1))
+        assert not is_valid([low] * (count + 1))
+
+
+@pytest.mark.parametrize(
+    ("changes", "valid"),
+    [
+        ({}, True),
+        ({"returns": []}, False),
+        ({"optimal_mean_return": "−40"}, False),
+        ({"regret": 1.0}, False),
+        ({"regret": None}, False),
+        ({"seed": 1}, False),
+        ({"more": 1}, False),
+        # Older versions also record settings that have no effect.
+        ({"config": {**PENDULUM.config.learning(), "save_every": 7, "target_period": 5}}, True),
+        ({"config": {**PENDULUM.config.learning(), "discount": 0.5}}, False),
+    ],
+    ids=str,
+)
+def test_result_with_another_content_is_refused_despite_its_checksum(
+    changes: dict[str, Any], valid: bool
+) -> None:
+    content = json.loads(encode(PENDULUM, PENDULUM_RESULT))["result"] | changes
+    found = decode(job_module._with_checksum(content), PENDULUM)
+    assert found == (PENDULUM_RESULT if valid else None)
+
+
+def test_result_with_a_changed_digit_is_refused() -> None:
+    data = encode(PENDULUM, PENDULUM_RESULT)
+    changed = data.replace(b"-100.0", b"-101.0", 1)
+    assert changed != data
+    assert decode(changed, PENDULUM) is None
+
+
+def test_result_has_the_settings_of_the_learning_only() -> None:
+    settings = json.loads(encode(PENDULUM, PENDULUM_RESULT))["result"]["config"]
+    assert settings.keys() == PENDULUM.config.learning().keys() - {"seed"}
 
 
 def test_run_has_a_greedy_regret_for_each_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,106 +145,3 @@ def test_run_has_a_greedy_regret_for_each_evaluation(monkeypatch: pytest.MonkeyP
 def test_run_is_evaluated_at_most_10_times(episodes: int, every: int) -> None:
     assert evaluate_every(preset("reference", episodes=episodes)) == every
     assert episodes // every <= 10
-
-
-@pytest.mark.parametrize(
-    ("regrets", "valid"),
-    [
-        ([], True),  # a result of an older version
-        ([0.5] * 5, True),
-        ([-0.5, *[1000.0] * 4], True),
-        ([0.5] * 4, False),
-        ([math.nan] * 5, False),
-        ([-300 * LOWEST] * 5, False),
-        (["1"] * 5, False),
-    ],
-)
-def test_result_is_valid_with_all_its_greedy_regrets_or_none(
-    regrets: list[Any], valid: bool
-) -> None:
-    result = PENDULUM_RESULT._replace(greedy_regrets=regrets)
-    assert (decode(encode(PENDULUM, result), PENDULUM) == result) == valid
-
-
-def test_result_of_an_older_version_is_read() -> None:
-    content = json.loads(encode(PENDULUM, PENDULUM_RESULT))["result"]
-    del content["greedy_regrets"]
-    assert decode(job_module._with_checksum(content), PENDULUM) == PENDULUM_RESULT
-
-
-def test_result_has_no_settings_of_evaluations_during_the_run() -> None:
-    # So the results of studies from before these settings are still valid.
-    settings = json.loads(encode(PENDULUM, PENDULUM_RESULT))["result"]["config"]
-    assert "save_every" in settings
-    assert not {"evaluate_every", "keep_best", "snapshots"} & set(settings)
-
-
-def test_cartpole_results_at_the_limits_are_valid() -> None:
-    result = RunResult(500.0, [500.0] * 99 + [0.0], [1.0] * 2, [500.0, 0.0])
-    assert decode(encode(POLE, result), POLE) == result
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"optimal_mean_return": 0.001},
-        {"optimal_mean_return": 200 * LOWEST - 0.001},
-        {"optimal_mean_return": math.nan},
-        {"optimal_mean_return": "−40"},
-        {"returns": [-41.5] * 99},
-        {"returns": [-41.5] * 101},
-        {"returns": [-41.5] * 99 + [0.001]},
-        {"returns": [-41.5] * 99 + [200 * LOWEST - 0.001]},
-        {"returns": [-41.5] * 99 + [math.nan]},
-        {"returns": [-41.5] * 99 + [-math.inf]},
-        {"returns": [-41.5] * 99 + [False]},
-        {"average_rewards": [-1.0]},
-        {"average_rewards": [-1.0, LOWEST - 0.001]},
-        {"average_rewards": [-1.0, 0.001]},
-        {"average_rewards": [-1.0, None]},
-        {"episode_returns": [-1.0] * 3},
-        {"episode_returns": [-1.0, 100 * LOWEST - 0.001]},
-        {"episode_returns": [-1.0, 0.001]},
-    ],
-    ids=str,
-)
-def test_numbers_that_no_run_can_have_are_refused_despite_their_checksum(
-    changes: dict[str, Any],
-) -> None:
-    assert decode(encode(PENDULUM, PENDULUM_RESULT), PENDULUM) == PENDULUM_RESULT
-    content = {
-        **job_module._settings(PENDULUM),
-        **PENDULUM_RESULT._asdict(),
-        "regret": PENDULUM_RESULT.regret,
-        **changes,
-    }
-    if isinstance(content["optimal_mean_return"], float) and None not in content["returns"]:
-        regret = content["optimal_mean_return"] - sum(content["returns"]) / len(content["returns"])
-        content["regret"] = regret
-    assert decode(job_module._with_checksum(content), PENDULUM) is None
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"returns": [499.0] * 99 + [500.001]},
-        {"returns": [499.0] * 99 + [-0.001]},
-        {"average_rewards": [1.0, 1.001]},
-        {"episode_returns": [20.0, 500.001]},
-    ],
-    ids=str,
-)
-def test_cartpole_results_beyond_the_limits_are_refused(changes: dict[str, Any]) -> None:
-    assert decode(encode(POLE, POLE_RESULT), POLE) == POLE_RESULT
-    assert decode(encode(POLE, POLE_RESULT._replace(**changes)), POLE) is None
-
-
-@pytest.mark.parametrize("changes", [{"returns": []}, {"regret": 1.0}, {"regret": None}], ids=str)
-def test_result_without_returns_or_with_another_regret_is_refused(changes: dict[str, Any]) -> None:
-    content = {
-        **job_module._settings(PENDULUM),
-        **PENDULUM_RESULT._asdict(),
-        "regret": PENDULUM_RESULT.regret,
-    }
-    assert decode(job_module._with_checksum(content), PENDULUM) == PENDULUM_RESULT
-    assert decode(job_module._with_checksum({**content, **changes}), PENDULUM) is None

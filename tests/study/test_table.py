@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from keras_pendulum.optimum.discounted import discounted_return
-from keras_pendulum.optimum.optimal_return import optimal_return
+from keras_pendulum.optimum.optimal_return import discounted_return, optimal_return
 from keras_pendulum.study.arms import own_arms
 from keras_pendulum.study.job import RunResult
 from keras_pendulum.study.table import as_csv, as_json, as_markdown, make_rows
@@ -18,8 +17,8 @@ from keras_pendulum.study.table import as_csv, as_json, as_markdown, make_rows
 
 def test_columns_have_the_numbers_of_their_names() -> None:
     results = {
-        "reference": [RunResult(-1.0, [-5.0, -7.0], [], [])] * 4,  # regret 5
-        "other": [RunResult(0.0, [-regret], [], []) for regret in (20.0, 3.0, 1.0, 4.0)],
+        "reference": [RunResult(-1.0, [-5.0, -7.0], [], [], [])] * 4,  # regret 5
+        "other": [RunResult(0.0, [-regret], [], [], []) for regret in (20.0, 3.0, 1.0, 4.0)],
     }
     rows = make_rows(own_arms(["reference"], ["other: reference"]), results)
     assert [row.regrets for row in rows] == [[5.0] * 4, [20.0, 3.0, 1.0, 4.0]]
@@ -39,7 +38,7 @@ def test_columns_have_the_numbers_of_their_names() -> None:
 
 def test_table_has_the_regret_that_the_discount_alone_costs() -> None:
     arms = own_arms(["reference", "cartpole"], ["exact: reference discount=1"])
-    rows = make_rows(arms, {arm.name: [RunResult(0.0, [-9.0], [], [])] for arm in arms})
+    rows = make_rows(arms, {arm.name: [RunResult(0.0, [-9.0], [], [], [])] for arm in arms})
     costs = [row["discount_regret"] for row in json.loads(as_json(rows, {}))["rows"]]
     gamma = arms[0].config.discount
     returns = discounted_return(1.0, gamma, range(100))

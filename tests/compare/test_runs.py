@@ -1,13 +1,14 @@
+"""The folders that `compare` accepts, and the names of their runs."""
+
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
 
-from keras_pendulum.compare.folders import find_checkpoints, short_names
+from keras_pendulum.compare.__main__ import _find_runs
+from keras_pendulum.compare.runs import short_names
 from keras_pendulum.errors import UserError
-
-pytestmark = pytest.mark.quick
 
 
 @pytest.fixture
@@ -21,20 +22,17 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_checkpoint_of_each_folder_is_found(runs: Path) -> None:
-    assert find_checkpoints(["b", "c/a/", str(runs / "a")]) == [
-        Path("b/pendulum_weight.h5"),
-        Path("c/a/cartpole_weight.h5"),
-        runs / "a" / "pendulum_weight.h5",
-    ]
+    found = [run.weights for run in _find_runs(["b", "c/a/", str(runs / "a")])]
+    names = ["b/pendulum_weight.h5", "c/a/cartpole_weight.h5", "a/pendulum_weight.h5"]
+    assert found == [(runs / name).resolve() for name in names]
 
 
 @pytest.mark.parametrize(
     ("folders", "message"),
     [
-        (["a", "missing"], "missing: no such folder; expected the folder of a run"),
-        (["a/pendulum_weight.h5"], "a file; expected the folder of a run"),
+        (["a", "a"], "a and a are the same folder: name it once"),
+        (["a", "b", "./a"], r"a and \./a are the same folder"),
         (["c"], r"c: holds no run \(no pendulum_weight.h5 or cartpole_weight.h5\)"),
-        (["a", "b", "./a"], r"a and \./a are the same folder: name it once"),
         (["n" * 300], "expected the folder of a run"),
         (["a\0b"], "expected the folder of a run"),
     ],
@@ -43,16 +41,11 @@ def test_folder_without_a_run_of_its_own_is_refused(
     folders: list[str], message: str, runs: Path
 ) -> None:
     with pytest.raises(UserError, match=message):
-        find_checkpoints(folders)
-
-
-def test_folder_with_two_runs_is_refused(runs: Path) -> None:
-    (runs / "a" / "cartpole_weight.h5").touch()
-    with pytest.raises(UserError, match=r"^a: holds pendulum_weight.h5 and cartpole_weight.h5: "):
-        find_checkpoints(["a"])
+        _find_runs(folders)
 
 
 def test_names_have_as_many_parents_as_make_them_different(runs: Path) -> None:
     assert short_names(["a", "b"]) == ["a", "b"]
     assert short_names(["a", "c/a"]) == [f"{runs.name}/a", "c/a"]
     assert short_names(["c/a/."]) == ["a"]
+    assert short_names(["/", "a"]) == ["/", "a"]
