@@ -6,11 +6,8 @@ The names below are the public API. The first use of one imports what it needs.
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.keras_registration import register_with_keras
 from keras_pendulum.tensorflow_setup import (
     fast_import,
     require_tensorflow,
@@ -21,16 +18,18 @@ from keras_pendulum.version import __version__
 if TYPE_CHECKING:
     from keras_pendulum.config.config import Config
     from keras_pendulum.config.presets import preset
-    from keras_pendulum.diagnose.diagnosis import Diagnosis, diagnose
+    from keras_pendulum.diagnosis.diagnosis import Diagnosis, diagnose
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
     from keras_pendulum.evaluate.evaluation import evaluate_policy
-    from keras_pendulum.evaluate.loaded_policy import Policy, load_policy
-    from keras_pendulum.evaluate.q_functions import q_function
+    from keras_pendulum.evaluate.policy import Policy
+    from keras_pendulum.evaluate.q_policies import q_function
     from keras_pendulum.evaluate.score import Score
+    from keras_pendulum.evaluate.sources import load_policy
     from keras_pendulum.optimum.optimal_return import optimal_return
     from keras_pendulum.storage.find_weights import find_weights
-    from keras_pendulum.storage.weights import load_weights, save_weights
+    from keras_pendulum.storage.load_weights import load_weights
+    from keras_pendulum.storage.save_weights import save_weights
     from keras_pendulum.train.train_dqn import TrainingResult, train_dqn
 
 __all__ = [
@@ -56,48 +55,40 @@ __all__ = [
     "train_dqn",
 ]
 
+# The module of each name, without `keras_pendulum.`.
 _MODULES = {
-    "config.config": ("Config",),
-    "config.presets": ("preset",),
-    "diagnose.diagnosis": ("Diagnosis", "diagnose"),
-    "dqn.network": ("DQN",),
-    "errors": ("ConfigError", "UserError", "WeightsError"),
-    "evaluate.evaluation": ("evaluate_policy",),
-    "evaluate.loaded_policy": ("Policy", "load_policy"),
-    "evaluate.q_functions": ("q_function",),
-    "evaluate.score": ("Score",),
-    "optimum.optimal_return": ("optimal_return",),
-    "storage.find_weights": ("find_weights",),
-    "storage.weights": ("load_weights", "save_weights"),
-    "train.train_dqn": ("TrainingResult", "train_dqn"),
+    "Config": "config.config",
+    "ConfigError": "errors",
+    "DQN": "dqn.network",
+    "Diagnosis": "diagnosis.diagnosis",
+    "Policy": "evaluate.policy",
+    "Score": "evaluate.score",
+    "TrainingResult": "train.train_dqn",
+    "UserError": "errors",
+    "WeightsError": "errors",
+    "diagnose": "diagnosis.diagnosis",
+    "evaluate_policy": "evaluate.evaluation",
+    "find_weights": "storage.find_weights",
+    "load_policy": "evaluate.sources",
+    "load_weights": "storage.load_weights",
+    "optimal_return": "optimum.optimal_return",
+    "preset": "config.presets",
+    "q_function": "evaluate.q_policies",
+    "save_weights": "storage.save_weights",
+    "train_dqn": "train.train_dqn",
 }
 
-
-class _Package(ModuleType):
-    """This package, in which the room `diagnose` does not hide the function of the same name."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        # The import of a room sets it as an attribute here.
-        if not (name == "diagnose" and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
 set_environment_defaults()
-register_with_keras()
 
 
 def __getattr__(name: str) -> Any:
-    for module, names in _MODULES.items():
-        if name in names:
-            require_tensorflow()
-            with fast_import():
-                found = importlib.import_module(f"keras_pendulum.{module}")
-            # The import binds the name of the room, which would hide the function `diagnose`.
-            for each in names:
-                globals()[each] = getattr(found, each)
-            return globals()[name]
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    require_tensorflow()
+    with fast_import():
+        module = importlib.import_module(f"keras_pendulum.{_MODULES[name]}")
+    value = globals()[name] = getattr(module, name)
+    return value
 
 
 def __dir__() -> list[str]:

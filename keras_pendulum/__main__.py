@@ -16,10 +16,9 @@ from pathlib import Path
 
 from keras_pendulum.cli import OneLineParser, run_command
 from keras_pendulum.completion import complete_with, names
-from keras_pendulum.config.presets import PRESETS
-from keras_pendulum.environments.tasks import task_name
+from keras_pendulum.config.presets import DESCRIPTIONS, PRESETS
 from keras_pendulum.errors import did_you_mean
-from keras_pendulum.storage.shipped_weights import shipped_files, shipped_return
+from keras_pendulum.storage.shipped_weights import shipped_returns
 from keras_pendulum.version import __version__
 
 # `optimum` is not listed: it writes files of the package itself.
@@ -32,14 +31,6 @@ COMMANDS = {
     "compare": "draw the learning curves and regrets of several runs",
     "study": "train variants with many seeds, and compare their regrets",
 }
-PRESET_LINES = {
-    "reference": "the original without defects (default)",
-    "original": "the final listing, with its defects",
-    "walkthrough": "the step-by-step listing, with defects",
-    "swingup": "the same agent on the standard task",
-    "cartpole-original": "the agent of two PyTorch notebooks",
-    "cartpole": "this agent, tuned for all 500 steps",
-}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -51,10 +42,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     if "_ARGCOMPLETE" in os.environ:
         words = _words_before_cursor()
     if words and words[0] in COMMANDS:
-        command = importlib.import_module(f"keras_pendulum.{words[0]}.__main__")
+        command = importlib.import_module(f"keras_pendulum.{room(words[0])}.__main__")
         status: int = command.main(words[1:], f"{prog} {words[0]}")
         return status
     return run_command(lambda: _list(prog, words))
+
+
+def room(command: str) -> str:
+    """Returns the room of a command; `diagnose` is a function of the package as well."""
+    return "diagnosis" if command == "diagnose" else command
 
 
 def _list(prog: str, words: Sequence[str]) -> int:
@@ -84,20 +80,15 @@ def _list(prog: str, words: Sequence[str]) -> int:
 
 
 def _description(prog: str) -> str:
-    tasks = {
-        name: task_name(preset.environment, preset.gravity) for name, preset in PRESETS.items()
-    }
-    files = {path.stem: path for path in shipped_files()}
-    returns = {name: shipped_return(files[name]) for name in PRESETS if name in files}
+    tasks = {name: preset.task.name for name, preset in PRESETS.items()}
     sections = {
         f"commands ({prog} COMMAND --help shows the flags of one):": COMMANDS.items(),
         "presets (train --preset NAME):": [
-            (name, task, PRESET_LINES[name]) for name, task in tasks.items()
+            (name, task, DESCRIPTIONS[name]) for name, task in tasks.items()
         ],
         "shipped weights (evaluate NAME), mean return on 100 fixed starts:": [
             (name, tasks[name], f"{mean_return:8.2f}")
-            for name, mean_return in returns.items()
-            if mean_return is not None
+            for name, mean_return in shipped_returns().items()
         ],
     }
     return "\n\n".join(

@@ -1,4 +1,4 @@
-"""The command line: one line per error, the exit status, and Ctrl-C."""
+"""The command line: its parser, one line per error, and the exit status."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import io
 import os
 import re
 import shlex
-import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterable
@@ -91,35 +90,6 @@ class _HelpAll(argparse.Action):
         parser.show_hidden()
         parser.print_help()
         parser.exit()
-
-
-class ControlC:
-    """A context in which Ctrl-C raises KeyboardInterrupt.
-
-    The C code of pygame may drop the exception. `check` raises it again.
-    """
-
-    def __init__(self) -> None:
-        self._pressed = False
-        self._before = signal.getsignal(signal.SIGINT)
-
-    def check(self) -> None:
-        """Raises KeyboardInterrupt if Ctrl-C was pressed."""
-        if self._pressed:
-            raise KeyboardInterrupt
-
-    def __enter__(self) -> ControlC:
-        # A process that ignores Ctrl-C, or has its own handler, stays as it is.
-        if self._before is signal.default_int_handler:
-            signal.signal(signal.SIGINT, self._on_signal)
-        return self
-
-    def __exit__(self, *problem: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
-
-    def _on_signal(self, number: int, frame: object) -> None:
-        self._pressed = True
-        self.check()
 
 
 def add_activation_flag(parser: argparse.ArgumentParser) -> None:

@@ -9,7 +9,6 @@ import re
 import sys
 import warnings
 from collections.abc import Iterator
-from typing import IO
 
 from keras_pendulum.errors import UserError
 
@@ -91,7 +90,7 @@ def fast_import() -> Iterator[None]:
     """Imports TensorFlow and Keras in its `with` block, without garbage collection and notes.
 
     Their import creates so many permanent objects that collecting takes two fifths of its time
-    (benchmarks/import_time.py).
+    (benchmarks/speed/import_time.py).
     """
     imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
     gc.disable()
@@ -117,19 +116,20 @@ def _without_notes() -> Iterator[None]:
     if os.environ.get("TF_CPP_MIN_LOG_LEVEL") != _ENVIRONMENT["TF_CPP_MIN_LOG_LEVEL"]:
         yield
         return
-    with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):  # no file can be written, or standard error is closed
-            lines = stack.enter_context(tempfile.TemporaryFile())
-            stack.callback(_print_all_but_notes, lines, os.dup(2))
-            os.dup2(lines.fileno(), 2)
+    try:
+        lines = tempfile.TemporaryFile()  # noqa: SIM115
+        stderr = os.dup(2)
+    except OSError:  # no file can be written, or standard error is closed
         yield
-
-
-def _print_all_but_notes(lines: IO[bytes], stderr: int) -> None:
-    """Restores the standard error from its duplicate, and prints the lines that are no notes."""
-    os.dup2(stderr, 2)
-    os.close(stderr)
-    lines.seek(0)
-    for line in lines:
-        if not _NOTE.match(line):
-            os.write(2, line)
+        return
+    with lines:
+        os.dup2(lines.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+            lines.seek(0)
+            for line in lines:
+                if not _NOTE.match(line):
+                    os.write(2, line)

@@ -10,7 +10,6 @@ import sys
 from types import SimpleNamespace
 
 import pytest
-from conftest import command_line
 
 from keras_pendulum import cli
 
@@ -48,22 +47,6 @@ def test_closed_pipe_of_windows_ends_a_command_without_a_message(
     monkeypatch.setattr(os, "dup2", lambda *descriptors: None)
     assert cli.run_command(write) == 1
     assert capfd.readouterr().err == ""
-
-
-@pytest.mark.parametrize(
-    "name", ["train", "evaluate", "optimum", "page", "play", "compare", "study"]
-)
-@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
-def test_help_is_printed_in_any_code_page(name: str, encoding: str) -> None:
-    done = subprocess.run(
-        command_line(name, "--help"),
-        env={**os.environ, "PYTHONIOENCODING": encoding},
-        capture_output=True,
-        encoding=encoding,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("usage: python -m keras_pendulum.")
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])

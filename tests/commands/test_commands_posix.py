@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 from conftest import Command, command_line
-from test_commands import LATIN_1
 
 if sys.platform == "win32":
     pytest.skip("needs a pseudoterminal, a shell and names of bytes", allow_module_level=True)
@@ -79,21 +78,17 @@ def test_folder_without_a_text_as_name_is_used_but_not_by_tensorboard(
     assert (tmp_path / film).exists()
 
 
-def test_progress_bar_in_latin_1_replaces_unknown_characters(tmp_path: Path) -> None:
+def test_progress_bar_in_latin_1_replaces_unknown_characters(
+    in_process: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
     controller, terminal = pty.openpty()
-    done = subprocess.run(
-        command_line("train", *words),
-        cwd=tmp_path,
-        env=LATIN_1,
-        stdout=terminal,
-        stderr=subprocess.PIPE,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
+    with open(terminal, "w", encoding="latin-1") as output:
+        monkeypatch.setattr(sys, "stdout", output)
+        done = in_process("train", *words)
+    assert (done.returncode, done.stderr) == (0, "")
     assert b"?" in os.read(controller, 2**16)
     os.close(controller)
-    os.close(terminal)
 
 
 def redirected(to: str, *words: str, folder: Path) -> tuple[int, str]:
@@ -105,7 +100,6 @@ def redirected(to: str, *words: str, folder: Path) -> tuple[int, str]:
         env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
         stderr=subprocess.PIPE,
         text=True,
-        timeout=120,
         check=False,
     )
     return done.returncode, done.stderr
@@ -119,5 +113,5 @@ def test_closed_output_does_not_stop_training(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")
 def test_full_disk_of_the_output_is_one_error_line(tmp_path: Path) -> None:
-    result = redirected(">/dev/full", "evaluate", "original", folder=tmp_path)
+    result = redirected(">/dev/full", "__main__", folder=tmp_path)
     assert result == (2, "error: [Errno 28] No space left on device\n")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import configparser
 import re
 import sys
 from pathlib import Path
@@ -12,10 +11,10 @@ from conftest import ROOT, assert_same
 
 import keras_pendulum as kp
 from keras_pendulum import __main__ as door
-from keras_pendulum.config.presets import PRESETS
-from keras_pendulum.storage.weights import recorded_return
+from keras_pendulum.config.presets import DESCRIPTIONS, PRESETS
+from keras_pendulum.storage.load_weights import recorded_return
+from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.train import __main__ as train
-from keras_pendulum.train.checkpoint import load_history
 
 PACKAGE = Path(kp.__file__).parent
 
@@ -42,7 +41,7 @@ def test_commands_presets_and_shipped_weights_are_listed(
     assert max(map(len, shown.splitlines())) <= 80
     for name, text in door.COMMANDS.items():
         assert re.search(rf"^  {name} +{re.escape(text)}$", shown, re.MULTILINE)
-    for name, text in door.PRESET_LINES.items():
+    for name, text in DESCRIPTIONS.items():
         assert re.search(rf"^  {name} +\S.*  {re.escape(text)}$", shown, re.MULTILINE)
     assert re.search(r"^  swingup +Pendulum-v1, g = 10 ", shown, re.MULTILINE)
     for path in (ROOT / "weights").glob("*.h5"):
@@ -53,8 +52,7 @@ def test_commands_presets_and_shipped_weights_are_listed(
 
 def test_every_command_and_every_preset_is_listed() -> None:
     rooms = {path.parent.name for path in PACKAGE.glob("*/__main__.py")}
-    assert rooms - {"optimum"} == set(door.COMMANDS)
-    assert list(door.PRESET_LINES) == list(PRESETS)
+    assert rooms == {door.room(name) for name in door.COMMANDS}
     assert {path.stem for path in (ROOT / "weights").glob("*.h5")} <= set(PRESETS)
 
 
@@ -84,7 +82,7 @@ def test_command_behind_the_door_equals_its_module(
     lines = capsys.readouterr().out.replace("module", "door").splitlines()
     assert without_seconds(through_door.splitlines()) == without_seconds(lines)
     first, second = (
-        kp.TrainingResult(kp.load_weights(file), load_history(file)[1], True)
+        kp.TrainingResult(kp.load_weights(file), load_recorded_run(file).history, True)
         for file in sorted(tmp_path.glob("*/pendulum_weight.h5"))
     )
     assert_same(first, second)
@@ -122,10 +120,3 @@ def test_mistyped_command_is_one_error_line_with_the_similar_one(
     assert printed.err.startswith("error: ")
     assert printed.err.count("\n") == 1
     assert message in printed.err
-
-
-def test_script_of_the_package_is_this_command() -> None:
-    config = configparser.ConfigParser()
-    config.read(ROOT / "setup.cfg", encoding="utf-8")
-    scripts = config["options.entry_points"]["console_scripts"].split("\n")
-    assert scripts == ["", "keras-pendulum = keras_pendulum.__main__:main"]
