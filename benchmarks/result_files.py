@@ -1,16 +1,70 @@
-"""The results of the benchmarks and of the study, read from their files."""
+"""The files of results: the tables of the benchmarks with the machine they ran on."""
 
 from __future__ import annotations
 
 import json
+import os
+import platform
+import sys
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from benchmarks.departures import interval
-from benchmarks.report import RESULTS, Row
-
 ROOT = Path(__file__).parents[1]
-STUDY = ROOT / "docs" / "study"
+RESULTS = ROOT / "benchmarks" / "results"
+_PACKAGES = ("tensorflow-cpu", "tensorflow", "keras", "gymnasium", "numpy")
+
+Row = dict[str, Any]
+
+
+def versions(packages: Sequence[str]) -> list[str]:
+    """Returns name and version of each of the packages that is installed."""
+    found = []
+    for package in packages:
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def machine() -> str:
+    """Returns one line with the processor and the versions of Python and the packages."""
+    model = platform.processor() or platform.machine()
+    if sys.platform == "linux":
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        names = [line for line in lines if line.startswith("model name")]
+        model = names[0].split(":")[1].strip() if names else model
+    parts = [f"{os.cpu_count()} cores of {model}", f"Python {platform.python_version()}"]
+    return ", ".join(parts + versions(_PACKAGES))
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """Returns a Markdown table; its header is the keys of the first row."""
+    header = list(rows[0])
+    lines = [header, ["---"] * len(header), *([row[key] for key in header] for row in rows)]
+    return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
+
+
+def write(name: str, command: str, rows: Sequence[Row], *, also: Sequence[str] = ()) -> None:
+    """Writes the rows as JSON and Markdown to benchmarks/results, and prints them.
+
+    Args:
+        name: of the two files.
+        command: the command that measured the rows.
+        rows: all with the same keys.
+        also: further packages with their versions, in this environment or in that of a peer.
+    """
+    RESULTS.mkdir(exist_ok=True)
+    setup = ", ".join([machine(), *also])
+    content = {"command": command, "machine": setup, "rows": list(rows)}
+    (RESULTS / f"{name}.json").write_text(
+        json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
+    text = f"`{command}`\n\n{markdown(rows)}\n{setup}.\n"
+    (RESULTS / f"{name}.md").write_text(text, encoding="utf-8")
+    print(text)
 
 
 def rows_of(name: str) -> list[Row]:
@@ -19,35 +73,7 @@ def rows_of(name: str) -> list[Row]:
     return rows
 
 
-def row_of(name: str, **cells: Any) -> Row:
-    """Returns the first row of a result with these cells; a column's spaces are `_` here."""
-    wanted = {key.replace("_", " "): value for key, value in cells.items()}
-    return next(row for row in rows_of(name) if row.items() >= wanted.items())
-
-
 def machine_of(name: str) -> str:
     """Returns the sentence that says where a result was measured."""
     machine = json.loads((RESULTS / f"{name}.json").read_text("utf-8"))["machine"]
     return f"Measured on {machine.split(', tensorflow')[0]}.\n"
-
-
-def study() -> dict[str, Any]:
-    """Returns the table of the study."""
-    table: dict[str, Any] = json.loads((STUDY / "table.json").read_text("utf-8"))
-    return table
-
-
-def printed_by(command: str) -> list[str]:
-    """Returns the lines that a command of benchmarks.first_run printed."""
-    return [row["line"] for row in rows_of("first_run") if row["command"] == command]
-
-
-def number(value: float) -> str:
-    """Returns a regret with three digits, such as 1.79, 73.3 or 1218."""
-    return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
-
-
-def summary(regrets: list[float]) -> str:
-    """Returns mean and worst regret, from 10 runs on with the interval of the mean."""
-    uncertainty = f" ({interval(regrets)})" if len(regrets) >= 10 else ""
-    return f"mean {sum(regrets) / len(regrets):.1f}{uncertainty}, worst {max(regrets):.1f}"

@@ -3,15 +3,15 @@
     python -m benchmarks.tables
 
 A block is the text between `<!-- NAME: python -m benchmarks.tables -->` and `<!-- end -->`. The
-command replaces it by what `benchmarks.blocks` makes from benchmarks/results, docs/study and the
-package. Run it after each measurement; a test fails until the pages have the measured figures.
+command replaces it by what `benchmarks.pages.blocks` makes from benchmarks/results, docs/study and
+the package. Run it after each measurement; a test fails until the pages have the measured figures.
 """
 
 from __future__ import annotations
 
 import re
 
-from benchmarks.blocks import BLOCKS, documents
+from benchmarks.pages.blocks import BLOCKS, documents
 
 _BLOCK = re.compile(
     r"^<!-- (?P<name>[^\n]+): python -m benchmarks\.tables -->\n(?P<text>.*?)^<!-- end -->$",

@@ -1,0 +1,42 @@
+"""The optima in the package: the files in `keras_pendulum/optimum/data`.
+
+    python -m benchmarks.learning.shipped_optima [FOLDER]
+
+Computes the best possible returns of the seeds 0 to 9999. Computes those of the optimal policy for
+the discount of `reference` and `swingup` for the seeds 0 to 999. It takes some ten minutes.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.optimum.best_return import compute_returns
+from keras_pendulum.optimum.stored_results import Problem, write
+
+DATA = Path(__file__).parents[2] / "keras_pendulum" / "optimum" / "data"
+# Gravity and discount of `reference` and `swingup`, with the steps of a whole and of a training
+# episode.
+SHIPPED = [
+    Problem(gravity, steps, discount)
+    for gravity, training_steps, own_discount in ((1.0, 100, 0.9), (10.0, 40, 0.985))
+    for steps in (200, training_steps)
+    for discount in (1.0, own_discount)
+]
+
+
+def main(folder: str = str(DATA)) -> None:
+    """Computes the returns and writes the files into an existing folder."""
+    for problem in SHIPPED:
+        seeds = range(10_000 if problem.discount == 1 else 1000)
+        returns = compute_returns(problem, pendulum_starts(seeds))
+        path = Path(folder) / problem.file_name
+        write(path, problem, seeds=np.array(seeds), returns=returns)
+        print(f"{path}: mean {returns.mean():.4f}")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,56 @@
+"""The training of several settings with several seeds, and their regrets in a table."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from multiprocessing.pool import Pool
+
+import numpy as np
+
+import keras_pendulum as kp
+from benchmarks.result_files import Row
+
+
+def two_processes() -> Pool:
+    """Returns two processes; each may train one run at a time."""
+    # TensorFlow does not survive a fork, so the processes are spawned.
+    return multiprocessing.get_context("spawn").Pool(2)
+
+
+def regret(config: kp.Config, starts: range) -> float:
+    """Trains; returns the greedy regret on the starts of these seeds, rounded to 0.01."""
+    network = kp.train_dqn(config).network
+    return round(kp.evaluate_policy(network, episodes=len(starts), seed=starts[0]).regret, 2)
+
+
+def interval(regrets: Sequence[float]) -> str:
+    """Returns the 95 % percentile-bootstrap interval of the mean, such as `1.2 to 1.5`."""
+    resampled = np.random.default_rng(0).choice(regrets, (9999, len(regrets))).mean(axis=1)
+    low, high = np.quantile(resampled, (0.025, 0.975))
+    return f"{low:.1f} to {high:.1f}"
+
+
+def table_row(name: str, regrets: list[float]) -> Row:
+    """Returns the row of a variant with its regrets, one for each training seed."""
+    return {
+        "training": name,
+        "mean regret": round(sum(regrets) / len(regrets), 2),
+        "95 % interval": interval(regrets),
+        "worst regret": max(regrets),
+        "regrets": regrets,
+    }
+
+
+def train_variants(variants: dict[str, kp.Config], seeds: range, starts: range) -> list[Row]:
+    """Trains each variant with each of the seeds, two runs at a time; returns a row for each."""
+    rows: list[Row] = []
+    with two_processes() as pool:
+        for name, config in variants.items():
+            configs = [replace(config, seed=seed) for seed in seeds]
+            regrets = pool.map(partial(regret, starts=starts), configs, 1)
+            rows.append(table_row(name, regrets))
+            print(f"{name:25} {regrets}", flush=True)
+    return rows
