@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +22,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.dqn.replay_buffer import ReplayBuffer, Transitions
 from keras_pendulum.environments.actions import TorqueGrid
-from keras_pendulum.environments.tasks import STEPS_PER_EPISODE, make_environment
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 
 if TYPE_CHECKING:
     import keras_pendulum as kp
@@ -39,6 +41,9 @@ Refusal = Callable[[Callable[[list[str]], int], Sequence[object]], str]
 
 # A shell starts a background job with Ctrl-C ignored, and so would every command in the tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+# Libraries ask the standard input for its encoding, and pytest has none where it is closed.
+if sys.__stdin__ is None:
+    sys.__stdin__ = open(os.devnull, encoding="utf-8")  # type: ignore[misc]  # noqa: SIM115
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -59,8 +64,8 @@ def recorded() -> Recorded:
 @pytest.fixture(scope="session")
 def recorded_transitions(recorded: Recorded) -> Transitions:
     """All transitions [100000] of the recorded run, made by taking its actions again."""
-    replay = ReplayBuffer(len(recorded["action_index"]))
-    env = make_environment("Pendulum-v1", gravity=1.0)
+    replay = ReplayBuffer(len(recorded["action_index"]), observation_size=3)
+    env = Pendulum().make_env()
     torques = TorqueGrid(41)
     for step, action in enumerate(recorded["action_index"].tolist()):
         if step % STEPS_PER_EPISODE == 0:
@@ -68,7 +73,7 @@ def recorded_transitions(recorded: Recorded) -> Transitions:
         next_observation, reward, terminated, _, _ = env.step(torques.to_env_action(action))
         replay.add(observation, action, float(reward), next_observation, terminated)
         observation = next_observation
-    return Transitions(**replay.get_state())
+    return replay.transitions()
 
 
 @pytest.fixture
@@ -84,7 +89,6 @@ def command(tmp_path: Path) -> Command:
             env={**os.environ, **(environment or {})},
             capture_output=True,
             text=True,
-            timeout=300,
             check=False,
         )
 
@@ -94,20 +98,45 @@ def command(tmp_path: Path) -> Command:
 @pytest.fixture
 def in_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Command:
+) -> Iterator[Command]:
     """Runs a command as `command` does, but in this process, which is much faster."""
-    from keras_pendulum.evaluate import __main__ as evaluate
-    from keras_pendulum.train import __main__ as train
-
     monkeypatch.chdir(tmp_path)
 
-    def run(name: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    def run(
+        name: str, *arguments: object, environment: dict[str, str] | None = None
+    ) -> subprocess.CompletedProcess[str]:
         words = [str(argument) for argument in arguments]
-        status = {"train": train.main, "evaluate": evaluate.main}[name](words)
+        with environment_restored():
+            os.environ.update(environment or {})
+            room = "diagnosis" if name == "diagnose" else name
+            main = importlib.import_module(f"keras_pendulum.{room}.__main__").main
+            status = status_of(main, words)
         printed = capsys.readouterr()
         return subprocess.CompletedProcess(words, status, printed.out, printed.err)
 
-    return run
+    yield run
+    if "pygame" in sys.modules:  # a command with a window has started it
+        sys.modules["pygame"].quit()
+
+
+def status_of(main: Callable[[list[str]], int], words: list[str]) -> int:
+    """Returns the exit status of a command, which runs in this process."""
+    try:
+        return main(words)
+    except SystemExit as exit:  # raised by argparse
+        assert isinstance(exit.code, int)
+        return exit.code
+
+
+@contextlib.contextmanager
+def environment_restored() -> Iterator[None]:
+    """Restores the environment variables at the end of the `with` block."""
+    before = dict(os.environ)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
 
 
 @pytest.fixture
@@ -122,11 +151,7 @@ def refusal(
     monkeypatch.chdir(tmp_path)
 
     def error_line(main: Callable[[list[str]], int], words: Sequence[object]) -> str:
-        try:
-            status = main([str(word) for word in words])
-        except SystemExit as exit:  # raised by argparse
-            assert isinstance(exit.code, int)
-            status = exit.code
+        status = status_of(main, [str(word) for word in words])
         printed = capsys.readouterr()
         assert (status, printed.out) == (2, "")
         assert printed.err.startswith("error: ")
@@ -141,6 +166,12 @@ def refusal(
 def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]:
     """Returns the words that start a command of the package in this interpreter."""
     return [sys.executable, "-m", f"keras_pendulum.{name}", *map(str, arguments)]
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    """Returns when the condition is true. A wait without end fails by the limit in setup.cfg."""
+    while not condition():
+        time.sleep(0.02)
 
 
 def comparable(result: kp.TrainingResult) -> list[tuple[float, ...]]:

@@ -1,21 +1,25 @@
 """setup.cfg: TensorFlow's wheels for each system and Python, as the package index has them.
 
-The tests of the index ask pip for the versions that another system would get. `pip install
---dry-run` would give the same answer, but downloads 280 MB for each. They are skipped where the
-index cannot be reached.
+The tests of the index ask pip for all files of a project. They are skipped where the index cannot
+be reached.
 """
 
 from __future__ import annotations
 
 import configparser
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
+from functools import cache
 
 import pytest
 from conftest import ROOT
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
+from packaging.tags import mac_platforms, parse_tag
+from packaging.utils import parse_wheel_filename
+from packaging.version import Version
 
 CONFIG = configparser.ConfigParser()
 CONFIG.read(ROOT / "setup.cfg", encoding="utf-8")
@@ -39,11 +43,11 @@ def linux(machine: str) -> System:
 SYSTEMS = {
     "Linux x86-64": linux("x86_64"),
     "Linux aarch64": linux("aarch64"),
-    "macOS arm64": System("darwin", "arm64", ("macosx_14_0_arm64",)),
+    "macOS arm64": System("darwin", "arm64", tuple(mac_platforms((14, 0), "arm64"))),
     "Windows x86-64": System("win32", "AMD64", ("win_amd64",)),
 }
 WITHOUT_WHEELS = {
-    "Intel Mac": System("darwin", "x86_64", ("macosx_14_0_x86_64",)),
+    "Intel Mac": System("darwin", "x86_64", tuple(mac_platforms((14, 0), "x86_64"))),
     "Windows on Arm": System("win32", "ARM64", ("win_arm64",)),
 }
 
@@ -66,27 +70,34 @@ def tensorflow_for(system: System, python: str) -> Requirement:
     return requirement
 
 
-def versions(project: str, system: System, python: str) -> list[str]:
-    """Returns the versions with a wheel for a system and a Python, or skips the test."""
+@cache
+def wheels(project: str) -> tuple[str, ...]:
+    """Returns the names of all wheels of a project in pip's index, or skips the test."""
     done = subprocess.run(
-        [
-            *(sys.executable, "-m", "pip", "index", "versions", project, "-vv", "--retries", "0"),
-            *("--only-binary=:all:", "--python-version", python),
-            *(word for tag in system.tags for word in ("--platform", tag)),
-        ],
+        [sys.executable, "-m", "pip", "index", "versions", project, "-vv", "--retries", "0"],
         capture_output=True,
         text=True,
         check=False,
     )
-    for line in done.stdout.splitlines():
-        if line.startswith("Available versions: "):
-            return line.removeprefix("Available versions: ").split(", ")
+    printed = (done.stdout + done.stderr).splitlines()
     if "Fetched page http" not in done.stdout:
-        printed = (done.stdout + done.stderr).splitlines()
         reasons = [line.strip() for line in printed if "Could not fetch URL" in line]
         pytest.skip(f"the package index cannot be reached: {(reasons or printed)[-1]}")
-    assert "No matching distribution found" in done.stderr, done.stderr
-    return []
+    # A line for each file, also for those that this machine could not use.
+    links = [re.search(r"link.* https?://\S+/([^/\s]+\.whl)", line) for line in printed]
+    return tuple({link[1] for link in links if link})
+
+
+def versions(project: str, system: System, python: str) -> list[Version]:
+    """Returns the versions with a wheel for a system and a Python."""
+    interpreter = f"cp{python.replace('.', '')}"
+    tags = {
+        tag
+        for platform in system.tags
+        for tag in parse_tag(f"{interpreter}-{interpreter}-{platform}")
+    }
+    found = [parse_wheel_filename(name) for name in wheels(project)]
+    return [version for _, version, _, supported in found if supported & tags]
 
 
 def test_declared_pythons_are_those_of_the_classifiers() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import keras_pendulum as kp
-from benchmarks.blocks import documents
+from benchmarks.pages.blocks import documents
 
 # tests/evaluate/test_agents_page.py runs those of docs/agents.md.
 PAGES = [page for page in documents() if page.name != "agents.md"]

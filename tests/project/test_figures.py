@@ -11,10 +11,10 @@ import pytest
 from conftest import ROOT
 
 import keras_pendulum as kp
-from benchmarks.blocks import BLOCKS, documents
-from benchmarks.departures import BEFORE, departures
-from benchmarks.reasons import REASONS
-from benchmarks.result_files import printed_by
+from benchmarks.learning.departures import BEFORE, departures
+from benchmarks.pages.blocks import BLOCKS, documents
+from benchmarks.pages.preset_blocks import printed_by
+from benchmarks.pages.reasons import REASONS
 from benchmarks.tables import block_names, rewrite, without_blocks
 
 DOCUMENTS = list(documents())

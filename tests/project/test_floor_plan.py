@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,17 +14,18 @@ import pytest
 import keras_pendulum
 
 PACKAGE = Path(keras_pendulum.__file__).parent
-# From the top down. `__main__` starts the commands. The modules at the end have no room and may be
-# imported from everywhere.
+# From the top down. `__main__` and `diagnose` start commands. The modules at the end have no room;
+# every module may import them.
 ROOMS = (
-    *("study", "compare", "diagnose", "train", "play", "page", "evaluate", "optimum"),
-    *("storage", "dqn", "config", "environments"),
+    *("study", "compare", "diagnosis", "page", "play", "train", "evaluate", "figures"),
+    *("optimum", "storage", "config", "dqn", "environments"),
 )
 WITHOUT_ROOM = (
-    *("cli", "completion", "display", "keras_registration", "tensorflow_setup", "torque_colors"),
-    *("history", "version", "errors"),
+    *("cli", "completion", "display", "tensorflow_setup"),
+    *("history", "limits", "version", "errors"),
 )
-ORDER = ("__main__", *ROOMS, *WITHOUT_ROOM)
+LIBRARIES_OF_DQN = ("numpy", "keras", "tensorflow")
+ORDER = ("__main__", "diagnose", *ROOMS, *WITHOUT_ROOM)
 
 
 def imported_modules(path: Path, package: Path = PACKAGE) -> Iterator[str]:
@@ -96,7 +98,35 @@ def test_every_module_has_a_place_in_the_floor_plan() -> None:
     rooms = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
     assert rooms == set(ROOMS)
     without_room = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
-    assert without_room == {"__main__", *WITHOUT_ROOM}
+    assert without_room == {"__main__", "diagnose", *WITHOUT_ROOM}
+
+
+def test_dqn_imports_nothing_else_of_the_package_or_of_others() -> None:
+    for path in (PACKAGE / "dqn").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [alias.name for alias in getattr(node, "names", [])]
+            if isinstance(node, ast.ImportFrom):
+                names = [node.module or ""]
+            elif not isinstance(node, ast.Import):
+                continue
+            for name in names:
+                known = name.partition(".")[0] in (*sys.stdlib_module_names, *LIBRARIES_OF_DQN)
+                assert known or name.startswith("keras_pendulum.dqn."), f"{path.name}: {name}"
+
+
+def test_few_places_ask_which_task_it_is() -> None:
+    question = re.compile(
+        r"isinstance\([^)]*(Pendulum|CartPole)\)|(?<!def )require_pendulum\(|"
+        r"environment [!=]= \"|\.gravity is (not )?None"
+    )
+    places = [
+        f"{path.relative_to(PACKAGE)}: {line.strip()}"
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if path.parent.name != "environments"
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if question.search(line)
+    ]
+    assert len(places) <= 5, places
 
 
 def test_rooms_have_an_empty_init() -> None:
@@ -127,9 +157,9 @@ def test_rooms_have_an_empty_init() -> None:
             "circular imports: train.train_dqn -> train.loop -> train.train_dqn",
         ),
         (
-            "storage/weights.py",
+            "storage/load_weights.py",
             "from keras_pendulum import __version__",
-            "storage/weights.py imports the package itself",
+            "storage/load_weights.py imports the package itself",
         ),
     ],
 )
@@ -145,7 +175,22 @@ def test_wrong_import_is_reported_with_its_file(
     assert problem in problems(tmp_path)
 
 
-def test_function_is_not_hidden_by_the_room_of_its_name() -> None:
-    # In a process of its own, because the import of a room binds its name only once.
-    code = "import keras_pendulum as kp; kp.Diagnosis; kp.diagnose; assert callable(kp.diagnose)"
+@pytest.mark.parametrize(
+    "first",
+    [
+        "kp.Diagnosis",
+        "import keras_pendulum.diagnosis.diagnosis",
+        "from keras_pendulum.__main__ import main; main(['diagnose', 'nothing.h5'])",
+        "import runpy; sys.argv = ['diagnose', 'nothing.h5']\n"
+        "try: runpy.run_module('keras_pendulum.diagnose', run_name='__main__', alter_sys=True)\n"
+        "except SystemExit: pass",
+        "try: import keras_pendulum.diagnose\n"
+        "except ImportError as error: assert 'from keras_pendulum import diagnose' in str(error)\n"
+        "else: raise SystemExit('imported')",
+    ],
+    ids=["class", "room", "command of the package", "command", "import of the command"],
+)
+def test_function_is_not_hidden_by_the_command_of_its_name(first: str) -> None:
+    code = f"import sys\nimport keras_pendulum as kp\n{first}\nassert callable(kp.diagnose)\n"
+    code += "from keras_pendulum import diagnose\nassert diagnose is kp.diagnose"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from figure_texts import figure_of, require_legible
 
-from benchmarks.last_regret import Episodes
-from benchmarks.last_regret_figure import draw
+from benchmarks.learning.last_regret import Episodes
+from benchmarks.learning.last_regret_figure import draw
 
 
 def make_episodes(seed: int) -> Episodes:

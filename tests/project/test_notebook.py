@@ -11,7 +11,7 @@ from typing import Any
 import nbformat
 import pytest
 
-from benchmarks.notebook import TOUR, execute
+from benchmarks.pages.notebook import TOUR, execute
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-import configparser
+import itertools
 import json
 import os
 import re
@@ -11,15 +11,18 @@ import shutil
 import subprocess
 import sys
 import tarfile
-import tempfile
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import pytest
 from conftest import ROOT
+from packaging.requirements import Requirement
+from test_dependencies import CONFIG
+
+import keras_pendulum as kp
 
 FILES = (
     *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "README.md"),
@@ -60,25 +63,51 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
 
 
 @pytest.fixture(scope="module")
-def new_python(built: Built, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Creates a virtual environment with the wheel and its dependencies."""
+def new_python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Creates a virtual environment with the declared dependencies, linked to the installed ones.
+
+    It has no other package: a dependency that is not declared is missing.
+    """
     folder = tmp_path_factory.mktemp("new")
-    succeed([sys.executable, "-m", "venv", "environment"], folder, "no virtual environment")
+    succeed(
+        [sys.executable, "-m", "venv", "--without-pip", "environment"], folder, "no environment"
+    )
     python = folder / "environment" / "bin" / "python"
-    pip_install(python, folder, built.wheel)
-    yield python
-    shutil.rmtree(folder)  # 1.7 GB, which pytest would delete only three runs later
+    site = "import sysconfig; print(sysconfig.get_path('purelib'))"
+    target = Path(succeed([python, "-c", site], folder, "no site-packages").strip())
+    for file in {file for name in declared_distributions() for file in top_level_files(name)}:
+        (target / file.name).symlink_to(file)
+    return python
 
 
-@pytest.fixture(scope="module")
-def checkout_score() -> dict[str, Any]:
-    """Returns the score of `evaluate reference` in the checkout."""
-    return evaluate_reference(sys.executable, ROOT)
+def declared_distributions() -> set[str]:
+    """Returns the names of the package's requirements, and of all that they require."""
+    found: dict[str, str] = {}
+    waiting = [(line, "") for line in CONFIG["options"]["install_requires"].splitlines()]
+    while waiting:
+        line, extra = waiting.pop()
+        if not line or line.startswith("#"):
+            continue
+        requirement = Requirement(line)
+        if requirement.marker and not requirement.marker.evaluate({"extra": extra}):
+            continue
+        if line not in found:
+            found[line] = requirement.name
+            required = metadata.requires(requirement.name) or []
+            waiting += itertools.product(required, requirement.extras or [""])
+    return set(found.values())
+
+
+def top_level_files(name: str) -> set[Path]:
+    """Returns the files and folders of a distribution in its site-packages."""
+    distribution = metadata.distribution(name)
+    names = {file.parts[0] for file in distribution.files or () if file.parts[0] != ".."}
+    return {Path(str(distribution.locate_file(name))) for name in names - {"__pycache__"}}
 
 
 def test_wheel_contains_package_data_and_weights_only(built: Built) -> None:
     expected = files_below(ROOT / "keras_pendulum", "keras_pendulum") | {
-        f"keras_pendulum/shipped_weights/{path.name}" for path in ROOT.glob("weights/*.h5")
+        f"keras_pendulum/shipped_weights/{path.name}" for path in ROOT.glob("weights/*")
     }
     with zipfile.ZipFile(built.wheel) as archive:
         found = {name for name in archive.namelist() if ".dist-info/" not in name}
@@ -116,97 +145,78 @@ def test_declared_dependencies_are_the_imported_ones() -> None:
     # an extra check for it.
     imported -= {"keras_pendulum", "IPython", "torch", *sys.stdlib_module_names}
     imported -= {"argcomplete", "tensorboard", "scipy", "distributed", "dask"}
-    config = configparser.ConfigParser()
-    config.read(ROOT / "setup.cfg", encoding="utf-8")
-    declared = set(re.findall(r"^[\w-]+", config["options"]["install_requires"], re.MULTILINE))
+    declared = set(re.findall(r"^[\w-]+", CONFIG["options"]["install_requires"], re.MULTILINE))
     declared.remove("tensorflow-cpu")  # the same module as `tensorflow`
     assert {distribution.get(module, module) for module in imported} == declared
 
 
-@pytest.mark.parametrize("kind", ["wheel", "editable"])
-def test_new_environment_evaluates_the_shipped_weights(
-    kind: str, built: Built, new_python: Path, checkout_score: dict[str, Any], tmp_path: Path
+def test_wheel_in_a_new_environment_evaluates_the_shipped_weights(
+    built: Built, new_python: Path, tmp_path: Path
 ) -> None:
-    pip_install(
-        new_python, tmp_path, "--no-deps", "--no-index", "--force-reinstall", getattr(built, kind)
-    )
-    score = evaluate_reference(new_python, tmp_path)
-    assert same_score(score, checkout_score)
-    if kind == "wheel":
-        assert in_package(score, new_python.parents[1])
-    else:
-        assert Path(score["weights"]) == built.checkout / "weights" / "reference.h5"
-
-
-def test_install_from_the_sdist_evaluates_the_shipped_weights(
-    built: Built, checkout_score: dict[str, Any], tmp_path: Path
-) -> None:
-    target, empty = tmp_path / "target", tmp_path / "empty"
-    empty.mkdir()
-    pip_install(
-        sys.executable,
-        empty,
-        *("--no-deps", "--no-index", "--no-build-isolation", "--target", target, built.sdist),
-    )
-    score = evaluate_reference(sys.executable, empty, PYTHONPATH=str(target))
-    assert same_score(score, checkout_score)
-    assert in_package(score, target)
-
-
-def test_checkout_evaluates_its_own_weights(checkout_score: dict[str, Any]) -> None:
-    assert Path(checkout_score["weights"]) == ROOT / "weights" / "reference.h5"
-
-
-def test_installed_script_lists_the_shipped_weights(built: Built, tmp_path: Path) -> None:
-    target, empty = tmp_path / "target", tmp_path / "empty"
-    empty.mkdir()
-    pip_install(sys.executable, empty, "--no-deps", "--no-index", "--target", target, built.wheel)
-    script = shutil.which("keras-pendulum", path=target / "bin")
-    assert script is not None
-    shown = succeed([script], empty, "no list", PYTHONPATH=str(target))
+    pip_install(new_python, tmp_path, "--force-reinstall", built.wheel)
+    weights = evaluate_reference(new_python, tmp_path)
+    assert weights.match("keras_pendulum/shipped_weights/reference.h5")
+    assert new_python.parents[1] in weights.parents
+    script = new_python.with_name("keras-pendulum")
+    shown = succeed([script], tmp_path, "no list")
     assert shown.startswith("usage: keras-pendulum ")
     for path in ROOT.glob("weights/*.h5"):
         assert re.search(rf"^  {path.stem} .* -?\d+\.\d\d$", shown, re.MULTILINE)
-    printed = succeed([script, "evaluate", "--help"], empty, "no help", PYTHONPATH=str(target))
+    printed = succeed([script, "evaluate", "--help"], tmp_path, "no help")
     assert printed.startswith("usage: keras-pendulum evaluate ")
 
 
-def same_score(score: dict[str, Any], other: dict[str, Any]) -> bool:
-    return bool(score["mean_return"] == pytest.approx(other["mean_return"], rel=1e-6, abs=0.01))
+def test_editable_install_evaluates_the_weights_of_the_checkout(
+    built: Built, new_python: Path, tmp_path: Path
+) -> None:
+    pip_install(new_python, tmp_path, "--force-reinstall", built.editable)
+    weights = evaluate_reference(new_python, tmp_path)
+    assert weights == built.checkout / "weights" / "reference.h5"
 
 
-def in_package(score: dict[str, Any], folder: Path) -> bool:
-    path = Path(score["weights"])
-    return path.match("keras_pendulum/shipped_weights/reference.h5") and folder in path.parents
+def test_install_from_the_sdist_has_the_files_of_the_wheel(built: Built, tmp_path: Path) -> None:
+    pip_install(
+        sys.executable,
+        tmp_path,
+        "--no-build-isolation",
+        "--target",
+        tmp_path / "target",
+        built.sdist,
+    )
+    with zipfile.ZipFile(built.wheel) as archive:
+        expected = {name for name in archive.namelist() if ".dist-info/" not in name}
+    package = tmp_path / "target" / "keras_pendulum"
+    assert files_below(package, "keras_pendulum") == expected
 
 
-def evaluate_reference(python: str | Path, folder: Path, **environment: str) -> dict[str, Any]:
+def test_checkout_has_its_own_weights() -> None:
+    assert kp.find_weights("reference") == ROOT / "weights" / "reference.h5"
+
+
+def evaluate_reference(python: str | Path, folder: Path) -> Path:
+    """Returns the weights file that the command `evaluate` finds; checks its score."""
     words = [python, "-m", "keras_pendulum.evaluate", "reference", "--episodes", "3", "--json"]
-    with tempfile.TemporaryDirectory() as cache:  # an empty cache
-        environment["XDG_CACHE_HOME"] = cache
-        score: dict[str, Any] = json.loads(succeed(words, folder, "no evaluation", **environment))
-    return score
+    score = json.loads(succeed(words, folder, "no evaluation"))
+    expected = kp.evaluate_policy("reference", 3).mean_return
+    assert score["mean_return"] == pytest.approx(expected, rel=1e-6, abs=0.01)
+    return Path(score["weights"])
 
 
 def pip_install(python: str | Path, folder: Path, *words: str | Path) -> None:
     # Most of the byte code would never be used.
-    succeed(
-        [python, "-m", "pip", "install", "--quiet", "--no-compile", *words],
-        folder,
-        "pip could not install; dependencies need a package registry that pip can reach",
-    )
+    options = ["--quiet", "--no-compile", "--no-deps", "--no-index", *words]
+    pip = [sys.executable, "-m", "pip", "--python", python, "install"]
+    succeed([*pip, *options], folder, "pip could not install")
 
 
-def succeed(words: Sequence[str | Path], folder: Path, complaint: str, **environment: str) -> str:
+def succeed(words: Sequence[str | Path], folder: Path, complaint: str) -> str:
     """Returns the output of a command, run in a folder without any variables of Python."""
     clean = {
         name: value
         for name, value in os.environ.items()
         if not name.startswith(("PYTHON", "KERAS_", "TF_"))
     }
-    done = subprocess.run(
-        words, cwd=folder, env=clean | environment, capture_output=True, text=True, check=False
-    )
+    done = subprocess.run(words, cwd=folder, env=clean, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         command = " ".join(map(str, words))
         pytest.fail(f"{complaint}: {command}\n{done.stdout}{done.stderr}", pytrace=False)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, Command
 from test_dependencies import PYTHONS, WITHOUT_WHEELS
 from test_floor_plan import ROOMS, imported_modules
 
 import keras_pendulum as kp
-from benchmarks.blocks import documents
-from benchmarks.code_blocks import DQN_FILES
+from benchmarks.pages.blocks import documents
+from benchmarks.pages.code_blocks import DQN_FILES
 
 PACKAGE = Path(kp.__file__).parent
 
@@ -77,12 +75,10 @@ def test_pythons_and_systems_are_those_of_the_dependencies() -> None:
 
 
 @pytest.mark.parametrize("line", COMMANDS)
-def test_command_has_the_flags_that_the_pages_use(line: str) -> None:
+def test_command_has_the_flags_that_the_pages_use(line: str, in_process: Command) -> None:
     _, _, module, *words = shlex.split(line)
-    text = "--help-all" if module.endswith(".train") else "--help"
-    shown = subprocess.run(
-        [sys.executable, "-m", module, text], capture_output=True, text=True, check=True
-    ).stdout
+    name = module.removeprefix("keras_pendulum.")
+    shown = in_process(name, "--help-all" if name == "train" else "--help").stdout
     for word in words:
         if word.startswith("--"):
             assert re.search(rf"{word.partition('=')[0]}\b", shown), word
@@ -103,7 +99,7 @@ def test_files_that_a_page_names_exist(document: Path) -> None:
 def test_only_the_dqn_has_at_most_800_lines() -> None:
     lines = [(PACKAGE / name).read_text(encoding="utf-8").splitlines() for name in DQN_FILES]
     assert sum(map(len, lines)) <= 800
-    rooms = {"dqn", "train", "config", "environments", "errors", "history"}
+    rooms = {"dqn", "train", "config", "environments", "storage", "errors", "history"}
     for name in DQN_FILES:
         imported = imported_modules(PACKAGE / name)
         assert {module.split(".")[0] for module in imported} <= rooms, name

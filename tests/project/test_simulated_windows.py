@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -16,7 +16,15 @@ from conftest import TESTS, command_line
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="this is Windows, not simulated")
 
-SMALL = ("--preset", "original", "--hidden-units", "8")
+SMALL = ("--preset", "original", "--hidden-units", "8", "--out", "my run")
+# Runs several commands in one process.
+COMMANDS = """
+import json, sys
+from keras_pendulum.__main__ import main
+
+for words in json.loads(sys.argv[1]):
+    assert main(words) == 0, words
+"""
 
 
 def without_gpu_note(output: str) -> str:
@@ -51,15 +59,14 @@ class Windows:
             },
             capture_output=True,
             encoding="cp1252",
-            timeout=300,
             check=False,
         )
         done.stderr = without_gpu_note(done.stderr)
         return done
 
-    def output(self, name: str, *words: str | os.PathLike[str]) -> str:
-        """Returns the output of a command that has no error."""
-        done = self.run(*command_line(name, *words))
+    def output(self, *commands: Sequence[str]) -> str:
+        """Returns the output of commands that have no error."""
+        done = self.run(sys.executable, "-c", COMMANDS, json.dumps(commands))
         assert done.returncode == 0, done.stderr
         assert not done.stderr
         return done.stdout
@@ -116,43 +123,37 @@ def test_module_of_the_package_finds_nothing_that_windows_lacks(windows: Windows
     ]
 
 
-def test_run_is_trained_resumed_replaced_and_evaluated(windows: Windows) -> None:
+def test_run_is_trained_replaced_resumed_compared_and_evaluated(windows: Windows) -> None:
     run = windows.folder / "my run"
-    words = (*SMALL, "--out", run.name)
-    printed = windows.output("train", *words, "--episodes", "2", "--tensorboard").splitlines()
-    assert printed[-3].endswith('evaluate "my run/pendulum_weight.h5" --episodes 3 --render')
-    resumed = windows.output("train", "--resume", "--episodes", "3", "--out", run.name)
-    assert resumed.startswith("Episode: 2, ")
+    printed = windows.output(
+        ["train", *SMALL, "--episodes", "1", "--tensorboard"],
+        ["train", *SMALL, "--episodes", "2", "--overwrite"],
+        ["train", "--resume", "--episodes", "3", "--out", run.name],
+        ["compare", run.name, "--out", "runs.png"],
+        ["evaluate", f"{run.name}/pendulum_weight.h5", "--episodes", "2", "--gif", "film.gif"],
+        ["page", "reference", "--out", "page.html"],
+    )
+    assert 'evaluate "my run/pendulum_weight.h5" --episodes 3 --render\n' in printed
+    assert "Episode: 2, " in printed
     history = (run / "history.csv").read_bytes()
     assert [row[:2] for row in history.split(b"\n")] == [b"ep", b"0,", b"1,", b"2,", b""]
-    assert (run / "tensorboard").exists()
-    windows.output("train", *words, "--episodes", "1", "--overwrite")
     assert not (run / "tensorboard").exists()
-    assert (run / "history.csv").read_bytes().count(b"\n") == 2
-    table = windows.output("compare", run.name, "--out", "runs.png")
-    assert "| my run | original |    0 |        1 |" in table
+    assert "| my run | original |    0 |        3 |" in printed
     assert (windows.folder / "runs.png").read_bytes().startswith(b"\x89PNG")
-    weights = run / "pendulum_weight.h5"
-    score = windows.output("evaluate", weights, "--episodes", "2", "--gif", "film.gif")
-    assert "g = 1" in score
+    assert "Greedy on 2 fixed starts, Pendulum-v1, g = 1: " in printed
     assert (windows.folder / "film.gif").read_bytes().startswith(b"GIF8")
-    assert "-m keras_pendulum.storage.h5_process\n" in windows.processes()
-
-
-def test_page_is_written(windows: Windows) -> None:
-    printed = windows.output("page", "reference", "--out", "page.html")
-    assert (windows.folder / "page.html").as_uri() in printed
-    page = (windows.folder / "page.html").read_bytes()
-    assert b"\r" not in page
-    assert "θ" in page.decode()
+    assert "-m keras_pendulum.storage.hdf5_reader " in windows.processes()
+    page = windows.folder / "page.html"
+    assert page.as_uri() in printed
+    assert b"\r" not in page.read_bytes()
+    assert "θ" in page.read_text(encoding="utf-8")
 
 
 def test_study_of_two_runs_is_made_and_continued(windows: Windows) -> None:
-    words = ["--arm", "con: original episodes=1 hidden_units=8", "--workers", "2"]
-    printed = windows.output("study", *words, "--seeds", "1")
-    assert "1 runs in " in printed
-    # The study goes on with a second run, beside the files of the first.
-    assert "1 of 2 runs are already finished" in windows.output("study", *words, "--seeds", "2")
+    words = ["study", "--arm", "con: original episodes=1 hidden_units=8", "--seeds", "2"]
+    printed = windows.output([*words, "--workers", "2"], words)
+    assert "2 runs in " in printed
+    assert "\n2 of 2 runs are already finished" in printed  # read from the files
     study = windows.folder / "studies" / "arm-con"
     assert [file.name for file in sorted((study / "results").rglob("*"))] == [
         "arm-con",
@@ -167,7 +168,7 @@ def test_study_of_two_runs_is_made_and_continued(windows: Windows) -> None:
 
 
 def test_wrong_input_is_one_line_in_the_code_page(windows: Windows) -> None:
-    done = windows.run(*command_line("evaluate", "größe θ.h5"))
+    done = windows.run(*command_line("play", "--against", "größe θ.h5"))
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
         r"error: größe \u03b8.h5: no such file; expected a weights file (.h5)" + "\n"

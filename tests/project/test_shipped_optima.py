@@ -1,0 +1,31 @@
+"""The benchmark that writes the files in keras_pendulum/optimum/data."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from benchmarks.learning import shipped_optima
+from keras_pendulum.optimum.stored_results import Problem, read_returns
+
+
+def test_benchmark_writes_the_files_of_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fast_returns(problem: Problem, starts: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(-np.dot(problem, (1, 0.001, 1)) - np.abs(starts[:, 0]))
+
+    monkeypatch.setattr(shipped_optima, "compute_returns", fast_returns)
+    shipped_optima.main(str(tmp_path))
+    shipped = {path.name for path in shipped_optima.DATA.iterdir()}
+    assert {path.name for path in tmp_path.iterdir()} == shipped
+    for problem in shipped_optima.SHIPPED:
+        returns = read_returns(tmp_path / problem.file_name, problem)
+        assert (
+            returns.keys() == read_returns(shipped_optima.DATA / problem.file_name, problem).keys()
+        )
+        assert max(returns.values()) == pytest.approx(-np.dot(problem, (1, 0.001, 1)), abs=0.01)
