@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 
 class Fault(NamedTuple):
-    """What a fault is, why it hurts, and what to do."""
+    """The explanation and the remedy of a fault."""
 
     explanation: str  # two sentences
     remedy: str
@@ -137,7 +137,7 @@ class Finding:
 
     @property
     def cost(self) -> float | None:
-        """What the fault costs in return, where a repair shows it."""
+        """The return that the fault costs, where a repair shows it."""
         return None if self.repair is None else self.repair.won
 
     @property
@@ -147,7 +147,7 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """What to do."""
+        """The remedy of the fault."""
         return FAULTS[self.name].remedy
 
     @property

@@ -1,4 +1,4 @@
-"""What all pictures share: their fonts, the colours of torques, names, and the PNG file.
+"""The style of all pictures: their fonts, the colours of torques, names, and the PNG file.
 
 The colours of torques are the same in every picture and on the page. They are distinct for
 colour-blind people. In black and white the two directions look alike, so each picture also tells

@@ -1,4 +1,4 @@
-"""What is known exactly of a task: its best returns, and what its discount costs."""
+"""The exact solution of a task: its best returns, and the regret that its discount costs."""
 
 from __future__ import annotations
 

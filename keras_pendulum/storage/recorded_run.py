@@ -1,4 +1,4 @@
-"""What a checkpoint records of its run: settings, history and replay buffer."""
+"""The run that a checkpoint records: settings, history and replay buffer."""
 
 from __future__ import annotations
 

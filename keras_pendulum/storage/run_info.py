@@ -1,4 +1,4 @@
-"""What is recorded of the run that a network comes from."""
+"""The record of the run that a network comes from."""
 
 from __future__ import annotations
 
