@@ -11,7 +11,7 @@ import re
 import shlex
 import sys
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
 from keras_pendulum.errors import UserError, did_you_mean, one_line
@@ -126,6 +126,9 @@ def run_command(command: Callable[[], int]) -> int:
 
     A warning is one line on stderr too.
     """
+    # No command opens a window of Matplotlib. A notebook exports a backend that other environments
+    # do not have, and Keras imports Matplotlib.
+    os.environ["MPLBACKEND"] = "Agg"
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _print_warning
@@ -148,6 +151,23 @@ def run_command(command: Callable[[], int]) -> int:
             return 1
         print(f"error: {one_line(str(error))}", file=sys.stderr)
         return 2
+
+
+@contextlib.contextmanager
+def prints_to_stderr() -> Iterator[None]:
+    """Sends what is printed in its `with` block to standard error, also by a library in C.
+
+    A user's code may print, and the output of `--json` is one JSON object.
+    """
+    sys.stdout.flush()
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # a stream is closed
+            stdout = os.dup(1)
+            stack.callback(os.close, stdout)
+            stack.callback(os.dup2, stdout, 1)
+            os.dup2(2, 1)
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
 
 
 def _prepare_output() -> None:

@@ -9,11 +9,7 @@ from keras_pendulum.errors import UserError
 
 
 def require_display() -> None:
-    """Raises UserError when no window can be opened. Call it before TensorFlow is imported.
-
-    Without a display, SDL draws off-screen. That shows nothing, and it crashes in a process with
-    TensorFlow.
-    """
+    """Raises UserError when no window can be opened. Without a display, SDL shows nothing."""
     if not _opens_display():
         raise UserError("there is no display to open a window on")
 
@@ -32,12 +28,7 @@ def _opens_display() -> bool:
         pygame.display.init()
     except pygame.error:
         return False
-    driver = pygame.display.get_driver()
-    if driver == "x11":
-        # By default SDL shows its pictures with OpenGL, and an OpenGL driver may load an LLVM that
-        # crashes together with TensorFlow's. On other systems SDL has no other way.
-        os.environ.setdefault("SDL_FRAMEBUFFER_ACCELERATION", "0")
-    return driver != "offscreen"
+    return pygame.display.get_driver() != "offscreen"
 
 
 def draw_without_display() -> None:

@@ -22,6 +22,10 @@ _ENVIRONMENT = {
     "TF_ENABLE_ONEDNN_OPTS": "0",
     "TF_CPP_MIN_LOG_LEVEL": "3",  # no start-up notes
 }
+if sys.platform == "linux":
+    # By default SDL shows its pictures with OpenGL, whose driver may load an LLVM that crashes
+    # together with TensorFlow's. SDL reads the variable when it makes its first window.
+    _ENVIRONMENT["SDL_FRAMEBUFFER_ACCELERATION"] = "0"
 # A line of the C++ library absl, such as "I0000 00:00:1795466974.767995    4604 port.cc:153] …".
 _NOTE = re.compile(rb"WARNING: All log messages before absl::|[IWE]\d+ [\d:.]+ +\d+ [^ ]+:\d+\] ")
 _ROUNDING = (THREADS, "TF_ENABLE_ONEDNN_OPTS")
@@ -31,8 +35,29 @@ _MAY_ROUND_OTHERWISE = _IMPORTED_BEFORE and not os.environ.keys() >= set(_ROUNDI
 _MAY_CHOOSE_THREADS = not _IMPORTED_BEFORE and THREADS not in os.environ
 
 
+_forked_with_tensorflow = False
+
+
+def _remember_fork() -> None:
+    global _forked_with_tensorflow
+    _forked_with_tensorflow = "tensorflow" in sys.modules
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_remember_fork)
+
+
+def require_own_tensorflow() -> None:
+    """Raises UserError in a fork of a process with TensorFlow: its threads are not in the fork."""
+    if _forked_with_tensorflow:
+        raise UserError(
+            "training would hang here: this process is a fork of one that has imported TensorFlow; "
+            'start it with multiprocessing.get_context("spawn")'
+        )
+
+
 def set_environment_defaults() -> None:
-    """Sets the variables that TensorFlow reads; the user's own values stay.
+    """Sets the variables that TensorFlow and SDL read; the user's own values stay.
 
     A TensorFlow that was imported before this package stays as it is.
     """

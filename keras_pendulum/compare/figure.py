@@ -15,7 +15,7 @@ from keras_pendulum.figures.learning_curve import (
     trailing_mean,
 )
 from keras_pendulum.figures.regrets import RegretRow, draw_regrets
-from keras_pendulum.figures.style import STYLE, plain_text, png
+from keras_pendulum.figures.style import own_style, plain_text, png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +28,6 @@ def draw_comparison(runs: Sequence[ComparedRun], optimum: float | None) -> bytes
         runs: at least one, all of the same task.
         optimum: the best possible value of the curves; None draws no line for it.
     """
-    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     # The optimum is black.
@@ -36,7 +35,7 @@ def draw_comparison(runs: Sequence[ComparedRun], optimum: float | None) -> bytes
         RegretRow(_short_name(run.name), run.score.regret, curve_style(index + 1))
         for index, run in enumerate(runs)
     ]
-    with rc_context(STYLE):
+    with own_style():
         # Each run needs a row of the regrets, and a third of a row of the legend.
         height = max(4.6, 1.2 + 0.5 * len(runs)) + 0.1 * len(runs)
         figure = Figure(figsize=(12, height), layout="constrained")

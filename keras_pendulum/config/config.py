@@ -87,6 +87,15 @@ class Config(Recording, Learning):  # in this order, the fields of Learning come
         """Number of updates of the whole run with `train_frequency` episode."""
         return max(0, self.episodes - self.warmup_episodes) * self.updates_per_episode
 
+    @property
+    def averaged_updates(self) -> int:
+        """Number of updates over which the final weights are averaged.
+
+        The moving average begins with the initial weights. It is so short that they have no weight
+        at the end of the run: e^-10.
+        """
+        return max(1, min(self.average_updates, self.total_updates // 10))
+
     def _check_updates(self) -> None:
         """Raises ConfigError where the updates lack a torque, a learning rate or transitions."""
         if self.stored_index == "truncated" and self.torque_count != 41:

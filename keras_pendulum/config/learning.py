@@ -126,8 +126,10 @@ class Learning:
     average_updates: int = setting(
         1,
         "updates over which the final weights are averaged: a moving average, use_ema of Keras "
-        "(Polyak & Juditsky 1992); 1: the weights of the last update",
+        "(Polyak & Juditsky 1992), but at most a tenth of the run's updates; 1: the weights of the "
+        "last update",
         Integer(1, 1_000_000),
+        only=("train_frequency", "episode"),
     )
     target_update: str = setting(
         "soft",

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from keras_pendulum.cli import OneLineParser, add_torques_flag, nonempty_path, run_command
+from keras_pendulum.cli import (
+    OneLineParser,
+    add_torques_flag,
+    nonempty_path,
+    prints_to_stderr,
+    run_command,
+)
 from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.storage.shipped_weights import shipped_names
@@ -56,13 +63,14 @@ def _diagnose(arguments: argparse.Namespace) -> int:
         from keras_pendulum.storage.run_folder import find_run_if_folder
 
     agent, torques = arguments.agent, arguments.torques
-    if find_run_if_folder(agent) is None:
-        policy = named_policy(agent, torques)
-        policy.name = agent
-        agent, torques = policy, None
-    diagnosis = diagnose(
-        agent, gravity=arguments.gravity, discount=arguments.discount, torques=torques
-    )
+    with prints_to_stderr() if arguments.json else contextlib.nullcontext():
+        if find_run_if_folder(agent) is None:
+            policy = named_policy(agent, torques)
+            policy.name = agent
+            agent, torques = policy, None
+        diagnosis = diagnose(
+            agent, gravity=arguments.gravity, discount=arguments.discount, torques=torques
+        )
     if arguments.report:
         write_atomically(arguments.report, as_html(diagnosis).encode())
     print(json.dumps(diagnosis.as_json()) if arguments.json else diagnosis.summary())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from keras_pendulum.errors import one_line
-from keras_pendulum.figures.style import STYLE, plain_text
+from keras_pendulum.figures.style import own_style, plain_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,15 +17,16 @@ if TYPE_CHECKING:
     from keras_pendulum.diagnosis.faults import Finding
     from keras_pendulum.diagnosis.measurement import Measurement
 
+FONT_SIZE = 10
+
 
 def draw_diagnosis(
     measurement: Measurement, findings: Sequence[Finding], notes: Sequence[Finding]
 ) -> Figure:
     """Returns a Matplotlib figure; without finite Q-values, only the repairs are drawn."""
-    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    with rc_context({**STYLE, "font.size": 10}):
+    with own_style(FONT_SIZE):
         has_q = measurement.policy.has_q_values and measurement.finite
         figure = Figure(figsize=(10, 8) if has_q else (6, 4), layout="constrained")
         names = [finding.name for finding in findings] or ["No finding"]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import base64
-import io
 from html import escape
 from typing import TYPE_CHECKING
 
+from keras_pendulum.diagnosis.figure import FONT_SIZE
 from keras_pendulum.errors import one_line
+from keras_pendulum.figures.style import own_style, png
 
 if TYPE_CHECKING:
     from keras_pendulum.diagnosis.diagnosis import Diagnosis
@@ -65,6 +66,6 @@ def _text(text: str) -> str:
 
 
 def _image(diagnosis: Diagnosis) -> str:
-    stream = io.BytesIO()
-    diagnosis.figure().savefig(stream, format="png", dpi=90)
-    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
+    with own_style(FONT_SIZE):
+        picture = png(diagnosis.figure(), dpi=90)
+    return f"data:image/png;base64,{base64.b64encode(picture).decode()}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from keras_pendulum.display import require_display
 from keras_pendulum.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -98,8 +99,13 @@ class Task(ABC):
         Args:
             render_mode: Gymnasium's.
             steps: truncates an episode after so many steps; None takes Gymnasium's limit.
+
+        Raises UserError for the render mode `human` without a display.
         """
         import gymnasium
+
+        if render_mode == "human":
+            require_display()
 
         # The checker costs time at every step, and Gymnasium's own environments pass it.
         return gymnasium.make(

@@ -4,15 +4,21 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from keras_pendulum.cli import OneLineParser, add_activation_flag, add_torques_flag, run_command
+from keras_pendulum.cli import (
+    OneLineParser,
+    add_activation_flag,
+    add_torques_flag,
+    prints_to_stderr,
+    run_command,
+)
 from keras_pendulum.completion import complete_with, weights_files
-from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
 from keras_pendulum.evaluate.film_command import add_film_flags, make_films, require_film_files
 from keras_pendulum.storage.shipped_weights import shipped_names
@@ -64,8 +70,6 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 def _evaluate(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     require_film_files(arguments)
-    if arguments.render:
-        require_display()
 
     with fast_import():
         from keras_pendulum.evaluate.evaluation import evaluate_policy
@@ -77,19 +81,20 @@ def _evaluate(arguments: argparse.Namespace) -> int:
         if pygame.event.get(pygame.QUIT):  # Gymnasium ignores a closed window
             raise UserError("the window was closed before the end of the last episode")
 
-    policy = named_policy(arguments.agent, arguments.torques, arguments.activation)
-    score = evaluate_policy(
-        policy,
-        arguments.episodes,
-        arguments.seed,
-        gravity=arguments.gravity,
-        discount=arguments.discount,
-        render_mode="human" if arguments.render else None,
-        on_step=require_open_window if arguments.render else None,
-    )
-    if arguments.gif or arguments.video:
-        shown = Path(policy.name).stem if Path(policy.name).is_file() else policy.name
-        make_films(arguments, policy, score.task, shown)
+    with prints_to_stderr() if arguments.json else contextlib.nullcontext():
+        policy = named_policy(arguments.agent, arguments.torques, arguments.activation)
+        score = evaluate_policy(
+            policy,
+            arguments.episodes,
+            arguments.seed,
+            gravity=arguments.gravity,
+            discount=arguments.discount,
+            render_mode="human" if arguments.render else None,
+            on_step=require_open_window if arguments.render else None,
+        )
+        if arguments.gif or arguments.video:
+            shown = Path(policy.name).stem if Path(policy.name).is_file() else policy.name
+            make_films(arguments, policy, score.task, shown)
     if arguments.json:
         print(json.dumps({"weights": policy.name, **score.as_json()}))
     else:

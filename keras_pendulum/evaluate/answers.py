@@ -31,11 +31,11 @@ def call_agent(function: Callable[..., Any], *values: Any, **options: Any) -> An
         return function(*values, **options)
     except UserError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ActionError(f"the agent {failure(error)}") from error
 
 
-def failure(error: Exception) -> str:
+def failure(error: BaseException) -> str:
     """Returns what a user's code raised, and where."""
     frame = extract_tb(error.__traceback__)[-1]
     place = f"{Path(frame.filename).name}, line {frame.lineno}"

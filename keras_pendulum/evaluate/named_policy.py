@@ -68,13 +68,16 @@ def _load_code(word: str) -> Any:
         raise UserError(f"{place}: no such file; expected FILE.py:NAME")
     try:
         module = _run_file(Path(place)) if is_file else importlib.import_module(place)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         missing = isinstance(error, ModuleNotFoundError) and f"{place}.".startswith(
             f"{error.name}."
         )
         if missing and not is_file:
             raise UserError(f"{place}: no such module; expected PACKAGE.MODULE:NAME") from error
-        raise UserError(f"{place}: {failure(error)}") from error
+        advice = ""
+        if isinstance(error, SystemExit):
+            advice = '; what the file does as a program belongs below `if __name__ == "__main__":`'
+        raise UserError(f"{place}: {failure(error)}{advice}") from error
     if not hasattr(module, name):
         raise UserError(f"{place}: has no {name}{did_you_mean(name, vars(module))}")
     return getattr(module, name)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from keras_pendulum.figures.learning_curve import CURVE, draw_episode_axis, draw_learning_curve
 from keras_pendulum.figures.phase_planes import draw_planes
 from keras_pendulum.figures.regrets import scale_greedy_regrets
-from keras_pendulum.figures.style import STYLE, png
+from keras_pendulum.figures.style import own_style, png
 from keras_pendulum.optimum.phase_plane import PhasePlane
 
 if TYPE_CHECKING:
@@ -49,12 +49,11 @@ def draw_run(
         planes: phase planes to draw side by side, by name; may be empty.
         title: of the figure; its first line is the larger one.
     """
-    from matplotlib import rc_context
 
     evaluated = [record for record in history if not math.isnan(record.greedy_regret)]
     row = 2 if evaluated else 1  # of ε and loss
     rows = row + (3 if planes else 1)
-    with rc_context(STYLE):
+    with own_style():
         figure, grid = _figure_with_grid(rows, 2, top=_LEGEND + (_TITLE if title else 0.1))
         _draw_title(figure, title)
         axes = figure.add_subplot(grid[0, :])
@@ -81,10 +80,9 @@ def draw_live(
 
     Args: those of `draw_run`.
     """
-    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    with rc_context(STYLE):
+    with own_style():
         figure = Figure(figsize=(_WIDTH, _LIVE_HEIGHT))
         _draw_title(figure, title)
         curve, epsilon = figure.subplots(
@@ -100,9 +98,8 @@ def draw_live(
 
 def draw_phase_planes(planes: Mapping[str, PhasePlane]) -> bytes:
     """Returns a PNG with greedy torques and values, one column for each phase plane."""
-    from matplotlib import rc_context
 
-    with rc_context(STYLE):
+    with own_style():
         figure, grid = _figure_with_grid(2, 1, top=0.5)
         draw_planes(figure, grid[:, 0], planes, _BETWEEN / _ROW)
         return png(figure)

@@ -7,19 +7,32 @@ them apart in another way: by place, sign or hatching.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import textwrap
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Matplotlib's settings, for `rc_context`. The texts are legible at half the size too.
-STYLE: Any = {"font.size": 12, "axes.titlesize": "medium", "hatch.linewidth": 0.6}
+# Matplotlib's settings. The texts are legible at half the size too.
+_STYLE: Any = {"font.size": 12, "axes.titlesize": "medium", "hatch.linewidth": 0.6}
 CLOCKWISE = "#1c66ad"  # below 0 N·m
 NO_TORQUE = "#f4f2ec"
 COUNTERCLOCKWISE = "#d4620a"  # above 0 N·m
 SCALE = (CLOCKWISE, NO_TORQUE, COUNTERCLOCKWISE)  # from -2 to 2 N·m
+
+
+@contextlib.contextmanager
+def own_style(font_size: float = 12) -> Iterator[None]:
+    """Draws with Matplotlib's defaults and the style above, not the user's."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # it keeps the backend
+        matplotlib.rcParams.update({**_STYLE, "font.size": font_size})
+        yield
 
 
 def torque_color(torque: float) -> str:
@@ -39,8 +52,8 @@ def plain_text(text: str, letters: int) -> str:
     return textwrap.fill(text, letters).replace("$", r"\$")
 
 
-def png(figure: Figure) -> bytes:
-    """Returns the figure as a PNG file."""
+def png(figure: Figure, dpi: int = 100) -> bytes:
+    """Returns the figure as a PNG file. Call it in `own_style`, as Matplotlib draws it only now."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=100)
+    figure.savefig(stream, format="png", dpi=dpi)
     return stream.getvalue()

@@ -14,7 +14,7 @@ from keras_pendulum.figures.curves import (
     draw_marked_curve,
 )
 from keras_pendulum.figures.regrets import RegretRow, draw_regrets, scale_greedy_regrets
-from keras_pendulum.figures.style import STYLE, plain_text, png
+from keras_pendulum.figures.style import own_style, plain_text, png
 from keras_pendulum.study.job import RunResult, evaluate_every
 from keras_pendulum.study.statistics import curve_band
 from keras_pendulum.study.table import Row
@@ -37,13 +37,12 @@ def draw_study(rows: Sequence[Row], results: Mapping[str, Sequence[RunResult]]) 
     Returns:
         A PNG file's bytes.
     """
-    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     with_curve = [row for row in rows if row.arm.has_curve]
     styles = {row.arm.name: curve_style(index) for index, row in enumerate(with_curve)}
     tasks = list(dict.fromkeys(row.arm.task for row in with_curve))
-    with rc_context(STYLE):
+    with own_style():
         # A panel needs 4 inches, a row half an inch, and three names a line of the legend.
         legend = 0.3 * (1 + len(with_curve) // 2)
         figure = Figure(

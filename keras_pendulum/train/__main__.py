@@ -15,7 +15,6 @@ from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
 from keras_pendulum.completion import complete_with, folders, names, weights_files
 from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS, preset
-from keras_pendulum.display import require_display
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow, use_two_threads
@@ -76,8 +75,6 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.resume and arguments.init:
         raise UserError("--init starts a new run, --resume continues one: give only one of them")
     require_tensorflow()
-    if arguments.render:
-        require_display()
     live = _live_plot(config) if arguments.live else None
 
     with fast_import():

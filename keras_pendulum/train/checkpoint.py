@@ -166,6 +166,8 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
             run.agent.set_state({"online": dict(zip(paths, weights, strict=True)), **agent})
         except ValueError as error:
             raise WeightsError(f"{os.fsdecode(path)}: cannot be resumed, {error}") from error
+        if config.episodes != stored.episodes:
+            run.agent.restart_average()  # the old one belongs to a run of another length
         run.replay.set_state({"added": state["replay_added"], **replay})
         run.streams.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]

@@ -20,7 +20,7 @@ class LivePlot(Listener):
     """A listener that draws the learning curve of `rewards.png`, and ε.
 
     In a notebook it draws into the cell's output, else in a window. The run continues when the user
-    closes the window. Create the plot before TensorFlow is imported.
+    closes the window.
 
     Args:
         config: the settings of the run.

@@ -106,7 +106,7 @@ def make_optimizer(config: Config) -> keras.optimizers.Optimizer:
         epsilon=config.optimizer_epsilon,
         clipvalue=config.gradient_clip,
         use_ema=config.average_updates > 1,
-        ema_momentum=1 - 1 / config.average_updates,
+        ema_momentum=1 - 1 / config.averaged_updates,
         name=config.optimizer,  # the variables have the same paths in every process
     )
 

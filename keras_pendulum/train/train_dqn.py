@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from keras_pendulum.evaluate.score import Score
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.atomic_write import write_atomically
 from keras_pendulum.storage.run_folder import RunFolder
-from keras_pendulum.tensorflow_setup import warn_if_not_reproducible
+from keras_pendulum.tensorflow_setup import require_own_tensorflow, warn_if_not_reproducible
 from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 from keras_pendulum.train.evaluations import greedy_regret
 from keras_pendulum.train.folder_files import run_listeners
@@ -69,8 +70,8 @@ def train_dqn(
         WeightsError: the checkpoint is damaged.
         UserError: `resume` is combined with `init` or `overwrite`; `keep_best` or `snapshots` has
             no `out`; `out` holds no run to resume, is in use, cannot be written or is moved
-            meanwhile; or an observation, a reward, a loss or a weight is not finite. The last
-            checkpoint then holds finite weights.
+            meanwhile; this process is a fork of one with TensorFlow; or an observation, a reward,
+            a loss or a weight is not finite. The last checkpoint then holds finite weights.
         TypeError: `config` is not a Config, or `init` not a DQN.
     """
     require_type("config", config, Config)
@@ -82,6 +83,7 @@ def train_dqn(
         raise UserError("keep_best needs `out`, the folder for the best weights")
     if config.snapshots and out is None:
         raise UserError("snapshots needs `out`, the folder for the snapshots")
+    require_own_tensorflow()
     warn_if_not_reproducible()
     folder = None if out is None else RunFolder(out, config.environment)
     followers = [
@@ -139,7 +141,10 @@ def _train(run: Run, listeners: Sequence[Listener], should_stop: Callable[[], bo
 
 
 def _draw(run: Run, folder: RunFolder) -> Score:
-    """Evaluates the finished run and writes its picture; returns the score in its title."""
+    """Evaluates the finished run and writes its picture; returns the score in its title.
+
+    A picture that cannot be made is a warning: the run itself is complete.
+    """
     from keras_pendulum.figures.run_figure import draw_run
     from keras_pendulum.optimum.phase_plane import run_phase_planes
     from keras_pendulum.train.reference_returns import reference_returns, run_title
@@ -148,14 +153,15 @@ def _draw(run: Run, folder: RunFolder) -> Score:
     run.announce("evaluating")
     score = evaluate_policy(run.agent.online)
     run.announce("drawing")
-    planes = run_phase_planes(run.agent.online, config)
-    returns = reference_returns(config)
-    title = run_title(config, score)
     try:
+        planes = run_phase_planes(run.agent.online, config)
+        returns, title = reference_returns(config), run_title(config, score)
         picture = draw_run(run.history, config.task, returns, planes, title)
-    except (OSError, ImportError) as error:  # such as too many open files
-        raise UserError(
-            f"cannot draw {folder.picture}: {error}; the run is saved, and --resume draws it"
-        ) from error
-    write_atomically(folder.picture, picture)
+        write_atomically(folder.picture, picture)
+    except Exception as error:  # such as too many open files, or no font
+        warnings.warn(
+            f"cannot draw {folder.picture}: {error or type(error).__name__}; the run is saved, and "
+            "--resume draws it",
+            stacklevel=2,
+        )
     return score
