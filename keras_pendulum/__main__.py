@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from keras_pendulum.cli import OneLineParser, run_command
-from keras_pendulum.completion import complete_with, names
+from keras_pendulum.completion import complete_with, completes, names
 from keras_pendulum.config.presets import DESCRIPTIONS, PRESETS
 from keras_pendulum.errors import did_you_mean
 from keras_pendulum.storage.shipped_weights import shipped_returns
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     # What the user typed: Python itself runs this file, or a script of pip imports it.
     as_module = Path(sys.argv[0]).name == "__main__.py"
     prog = "python -m keras_pendulum" if as_module else "keras-pendulum"
-    if "_ARGCOMPLETE" in os.environ:
+    if completes():
         words = _words_before_cursor()
     if words and words[0] in COMMANDS:
         command = importlib.import_module(f"keras_pendulum.{room(words[0])}.__main__")

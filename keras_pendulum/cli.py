@@ -14,6 +14,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
+from keras_pendulum.completion import completes
 from keras_pendulum.errors import UserError, did_you_mean, one_line
 
 
@@ -50,12 +51,15 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Prints the error and exits with status 2."""
+        if message.endswith("expected one argument"):
+            flag = message.split()[1].rstrip(":").split("/")[-1]
+            message += f"; a value that begins with a minus needs {flag}=VALUE"
         self.exit(2, f"error: {one_line(message)}\n")
 
     def parse_args(self, *words: Any) -> Any:  # type: ignore[override]
         """Parses the command line; prints completions and exits where a shell asks for them."""
         _prepare_output()
-        if "_ARGCOMPLETE" in os.environ:
+        if completes():
             import argcomplete
 
             self.show_hidden()
@@ -140,6 +144,9 @@ def run_command(command: Callable[[], int]) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+    except MemoryError:
+        print("error: the memory is not large enough for this", file=sys.stderr)
+        return 2
     except OSError as error:
         # The reader of the output has exited, or the disk is full. Without this, Python prints a
         # second error when it flushes.
@@ -177,7 +184,7 @@ def _prepare_output() -> None:
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors != "replace":
         sys.stdout.reconfigure(errors="replace")
 
 

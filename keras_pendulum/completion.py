@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 Completer = Callable[..., Iterable[str]]  # called with the beginning of the word, `prefix`
+
+
+def completes() -> bool:
+    """Returns whether a shell has started this process for completions, and it can make them."""
+    return "_ARGCOMPLETE" in os.environ and importlib.util.find_spec("argcomplete") is not None
 
 
 def complete_with(action: argparse.Action, completer: Completer) -> None:

@@ -1,4 +1,4 @@
-"""Checks for a display before pygame opens a window."""
+"""Where pictures are shown: a display, which is checked before a window opens, or a notebook."""
 
 from __future__ import annotations
 
@@ -29,6 +29,13 @@ def _opens_display() -> bool:
     except pygame.error:
         return False
     return pygame.display.get_driver() != "offscreen"
+
+
+def in_notebook() -> bool:
+    """Returns whether the output is that of a notebook's cell."""
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython is not None else None
+    return shell is not None and hasattr(shell, "kernel")
 
 
 def draw_without_display() -> None:

@@ -54,8 +54,9 @@ def did_you_mean(word: str, names: Iterable[str]) -> str:
     import difflib
 
     by_lower_case = {name.lower(): name for name in names}
-    # A much longer word resembles no name, and comparing it takes long.
-    found = difflib.get_close_matches(word[:_LONGEST].lower(), by_lower_case, 1)
+    beginning = word[:_LONGEST].lower()  # a much longer one takes long to compare
+    found = [name for name in by_lower_case if len(beginning) > 2 and name.startswith(beginning)]
+    found += difflib.get_close_matches(beginning, by_lower_case, 1)
     return f"; did you mean {by_lower_case[found[0]]}?" if found else ""
 
 

@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Iterator
 
 from keras_pendulum.errors import UserError
+from keras_pendulum.status import status
 
 THREADS = "TF_NUM_INTRAOP_THREADS"  # the variable
 _ENVIRONMENT = {
@@ -120,8 +121,11 @@ def fast_import() -> Iterator[None]:
     imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
     gc.disable()
     try:
-        with contextlib.nullcontext() if imported else _without_notes():
+        if imported:
             yield
+        else:
+            with status("Loading TensorFlow"), _without_notes():
+                yield
     finally:
         if enabled:
             gc.enable()

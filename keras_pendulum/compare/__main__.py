@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from keras_pendulum.cli import OneLineParser, nonempty_path, require_ending, run_command
 from keras_pendulum.completion import complete_with, folders
 from keras_pendulum.errors import UserError, one_line
+from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 
@@ -55,7 +56,8 @@ def _compare(arguments: argparse.Namespace) -> int:
         from keras_pendulum.compare.figure import draw_comparison
         from keras_pendulum.compare.runs import best_possible, load_runs
 
-    runs = load_runs(run_folders)
+    with status("Evaluating the runs"):
+        runs = load_runs(run_folders)
     write_atomically(arguments.out, draw_comparison(runs, best_possible(runs)))
     score = runs[0].score
     print(

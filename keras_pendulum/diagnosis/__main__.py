@@ -17,6 +17,7 @@ from keras_pendulum.cli import (
     run_command,
 )
 from keras_pendulum.completion import complete_with, weights_files
+from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
@@ -68,12 +69,14 @@ def _diagnose(arguments: argparse.Namespace) -> int:
             policy = named_policy(agent, torques)
             policy.name = agent
             agent, torques = policy, None
-        diagnosis = diagnose(
-            agent, gravity=arguments.gravity, discount=arguments.discount, torques=torques
-        )
+        with status("Playing, and comparing with the exact solution"):
+            diagnosis = diagnose(
+                agent, gravity=arguments.gravity, discount=arguments.discount, torques=torques
+            )
+            text = json.dumps(diagnosis.as_json()) if arguments.json else diagnosis.summary()
     if arguments.report:
         write_atomically(arguments.report, as_html(diagnosis).encode())
-    print(json.dumps(diagnosis.as_json()) if arguments.json else diagnosis.summary())
+    print(text)
     return 0
 
 

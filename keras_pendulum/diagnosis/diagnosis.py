@@ -30,7 +30,7 @@ _NO_RUN = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The findings on an agent, the strongest first."""
 
@@ -45,10 +45,12 @@ class Diagnosis:
         measurement = self.measurement
         regret = f"regret {measurement.regret:.2f}"
         if not self.findings:
-            tolerance = f"up to {measurement.regret_tolerance:.1f} is little"
+            cost = measurement.discount_cost
+            little = measurement.regret_tolerance - cost
+            allowed = f"the discount alone costs {cost:.2f}, and up to {little:.1f} more is little"
             if measurement.regret <= measurement.regret_tolerance:
-                return f"No finding: {regret}, and {tolerance}."
-            return f"No finding, but {regret}, where {tolerance}: train for longer."
+                return f"No finding: {regret}; {allowed}."
+            return f"No finding, but {regret}; {allowed}: train for longer."
         first = self.findings[0]
         cost = "" if first.cost is None else f"; without it {first.cost:.1f} more return"
         return f"{first.name}: {first.evidence} (healthy: {first.healthy}); {regret}{cost}."
@@ -101,6 +103,12 @@ class Diagnosis:
         from keras_pendulum.diagnosis.figure import draw_diagnosis
 
         return draw_diagnosis(self.measurement, self.findings, self.notes)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Returns the state for pickle: everything is measured, and the agent's code left out."""
+        self.figure()
+        self.as_json()
+        return {**vars(self), "measurement": self.measurement.without_code()}
 
 
 def diagnose(

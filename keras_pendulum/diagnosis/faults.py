@@ -110,7 +110,8 @@ FAULTS: dict[str, Fault] = {
     "undetermined": Fault(
         "The values are wrong, but no single fault explains how. Several faults of the training "
         "leave the same network behind.",
-        "Diagnose the run folder instead of the network: its history and replay buffer tell more.",
+        "Look at the loss and the return over the run. Of a run of this package, diagnose the "
+        "folder: its history and replay buffer are used, too.",
     ),
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -50,6 +52,17 @@ class Measurement:
         actions = self.policy.actions
         assert isinstance(actions, TorqueActions)
         return actions.torques
+
+    def without_code(self) -> Measurement:
+        """Returns a copy whose policy has no part that pickle refuses, such as a local function."""
+        copied, policy = copy.copy(self), copy.copy(self.policy)
+        for name, value in vars(policy).items():
+            try:
+                pickle.dumps(value)
+            except Exception:  # which one depends on the value
+                setattr(policy, name, None)
+        vars(copied)["policy"] = policy
+        return copied
 
     def act(self, observations: Observations) -> Array:
         """Returns the torques [B] in N·m."""

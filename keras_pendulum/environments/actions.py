@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from keras_pendulum.environments.torque import MAX_TORQUE, require_torque
+from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING, require_torque
 from keras_pendulum.errors import ConfigError
 
 
@@ -106,11 +106,11 @@ def torque_actions(torques: ArrayLike | None, count: int | None = None) -> Torqu
         array = np.empty(0, object)
     if array.dtype.kind not in "fiu" or array.ndim != 1:
         raise ConfigError(f"torques are {torques!r}; expected a list of numbers (N·m)")
-    if not (np.abs(array) <= MAX_TORQUE).all():  # written so that NaN fails too
+    if not (np.abs(array) <= MAX_TORQUE + ROUNDING).all():  # written so that NaN fails too
         raise ConfigError(f"torques are {torques!r}; expected numbers from -2 to 2 (N·m)")
     if count is not None and len(array) != count:
         raise ConfigError(f"torques has {len(array)} numbers; the agent has {count} actions")
-    return TorqueActions(array.astype(np.float64))
+    return TorqueActions(array.astype(np.float64).clip(-MAX_TORQUE, MAX_TORQUE))
 
 
 def truncated_index(torque: float | np.floating[Any]) -> int:

@@ -21,6 +21,7 @@ from keras_pendulum.cli import (
 from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.errors import UserError
 from keras_pendulum.evaluate.film_command import add_film_flags, make_films, require_film_files
+from keras_pendulum.status import status
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 
@@ -83,15 +84,17 @@ def _evaluate(arguments: argparse.Namespace) -> int:
 
     with prints_to_stderr() if arguments.json else contextlib.nullcontext():
         policy = named_policy(arguments.agent, arguments.torques, arguments.activation)
-        score = evaluate_policy(
-            policy,
-            arguments.episodes,
-            arguments.seed,
-            gravity=arguments.gravity,
-            discount=arguments.discount,
-            render_mode="human" if arguments.render else None,
-            on_step=require_open_window if arguments.render else None,
-        )
+        with status("Evaluating") as report:
+            score = evaluate_policy(
+                policy,
+                arguments.episodes,
+                arguments.seed,
+                gravity=arguments.gravity,
+                discount=arguments.discount,
+                render_mode="human" if arguments.render else None,
+                on_step=require_open_window if arguments.render else None,
+                on_progress=report,
+            )
         if arguments.gif or arguments.video:
             shown = Path(policy.name).stem if Path(policy.name).is_file() else policy.name
             make_films(arguments, policy, score.task, shown)

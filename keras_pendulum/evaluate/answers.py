@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING
 from keras_pendulum.errors import UserError
 
+_TERMINAL_CODE = re.compile(r"\x1b\[[0-9;]{0,9}m")
 Batch = tuple[int, ...]  # (B,) for observations [B, 3], () for one observation [3]
 
 
@@ -39,18 +41,21 @@ def failure(error: BaseException) -> str:
     """Returns what a user's code raised, and where."""
     frame = extract_tb(error.__traceback__)[-1]
     place = f"{Path(frame.filename).name}, line {frame.lineno}"
-    return f"raised {type(error).__name__}: {error} ({place})"
+    # Keras prints its reasons in bold, between empty lines, and all arguments behind them.
+    reason = " ".join(_TERMINAL_CODE.sub("", str(error)).split())
+    reason = reason.partition(" Arguments received by")[0]
+    return f"raised {type(error).__name__}: {reason} ({place})"
 
 
 def torques_of(answer: Any, batch: Batch) -> NDArray[np.float64]:
     """Returns the torques in N·m of the shape `batch`. Raises ActionError for anything else."""
     each = f" for each of {batch[0]} observations" if batch else ""
     torques = _numbers(answer, batch, f"expected a torque in N·m{each}").astype(np.float64)
-    valid = np.abs(torques) <= MAX_TORQUE  # false for NaN too
+    valid = np.abs(torques) <= MAX_TORQUE + ROUNDING  # false for NaN too
     if not valid.all():
         row = int(valid.argmin())
-        raise _wrong(f"the torque {torques.flat[row]:g} N·m", "expected a number from -2 to 2", row)
-    return torques
+        raise _wrong(f"the torque {torques.flat[row]} N·m", "expected a number from -2 to 2", row)
+    return torques.clip(-MAX_TORQUE, MAX_TORQUE)
 
 
 def indices_of(answer: Any, batch: Batch, count: int, first: int) -> NDArray[np.intp]:

@@ -18,6 +18,7 @@ from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.score import Score
 from keras_pendulum.evaluate.sources import as_policy
 from keras_pendulum.optimum.solutions import solution
+from keras_pendulum.status import Report
 
 Env = gymnasium.Env[Any, Any]
 OnStep = Callable[[Env], None]
@@ -34,6 +35,7 @@ def evaluate_policy(
     torques: ArrayLike | None = None,
     render_mode: str | None = None,
     on_step: OnStep | None = None,
+    on_progress: Report = lambda share: None,
 ) -> Score:
     """Returns the score of greedy episodes; episode i starts from `reset(seed=seed+i)`.
 
@@ -47,6 +49,7 @@ def evaluate_policy(
         torques: N·m, what the agent's outputs stand for; None takes `linspace(-2, 2, A)`.
         render_mode: Gymnasium's.
         on_step: called with the environment after each reset and each step.
+        on_progress: called at each step with the share of all steps that is done, 0 to 1.
 
     Raises ConfigError for a number out of range, and for a gravity, a discount or torques that the
     agent cannot have. Raises UserError when a weight is not finite, and for an answer that is not a
@@ -74,6 +77,10 @@ def evaluate_policy(
     # gets the observations of many episodes of the same length in one call.
     alone = policy.one_by_one or render_mode is not None or on_step is not None
     count = 1 if alone else min(_SIDE_BY_SIDE, episodes)
+
+    def report(first: int, step: int) -> None:
+        on_progress((first + count * step / task.steps_per_episode) / episodes)
+
     with contextlib.ExitStack() as stack:
         envs = [
             stack.enter_context(contextlib.closing(task.make_env(render_mode)))
@@ -81,7 +88,7 @@ def evaluate_policy(
         ]
         returns = np.concatenate(
             [
-                _returns(policy, envs, seeds[first : first + count], first, on_step)
+                _returns(policy, envs, seeds[first : first + count], first, on_step, report)
                 for first in range(0, episodes, count)
             ]
         )
@@ -89,9 +96,16 @@ def evaluate_policy(
 
 
 def _returns(
-    policy: Policy, envs: Sequence[Env], seeds: range, first: int, on_step: OnStep | None
+    policy: Policy,
+    envs: Sequence[Env],
+    seeds: range,
+    first: int,
+    on_step: OnStep | None,
+    report: Callable[[int, int], None],
 ) -> NDArray[np.float64]:
     """Returns the undiscounted return of an episode for each seed, in environments of their own.
+
+    `report` is called with `first` and the step.
 
     Raises UserError for an answer that is not an action, with its step and the number of its
     episode, which is `first` for the first seed.
@@ -115,6 +129,7 @@ def _returns(
             returns[row] += float(reward)
             if on_step:
                 on_step(env)
+        report(first, step)
         if terminated or truncated:
             break
     return returns

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from keras_pendulum.cli import nonempty_path, require_ending
 from keras_pendulum.display import draw_without_display
 from keras_pendulum.errors import UserError, one_line
+from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 
 if TYPE_CHECKING:
@@ -90,15 +91,18 @@ def make_films(arguments: argparse.Namespace, policy: Policy, task: Task, name: 
     _, *physics = task.name.split(", ")
     title = ", ".join([name, *(f"{each} m/s²" for each in physics)])
     draw_without_display()
-    pictures = list(film_episode(policy, task, (title, start), seed, angle))
+    with status("Drawing the film"):
+        pictures = list(film_episode(policy, task, (title, start), seed, angle))
     if arguments.gif:
         # Some steps are left out, but not the last one.
         interval = round(_GIF_SECONDS / task.seconds_per_step)
         shown = pictures[(len(pictures) - 1) % interval :: interval]
         write_atomically(arguments.gif, encode_gif(shown))
+        print(f"Wrote {arguments.gif}")
     if arguments.video:
         film = encode_mp4(find_ffmpeg(), pictures, task.seconds_per_step)
         write_atomically(arguments.video, film)
+        print(f"Wrote {arguments.video}")
 
 
 def encode_gif(pictures: Sequence[Image]) -> bytes:

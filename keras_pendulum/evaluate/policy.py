@@ -77,7 +77,7 @@ class Policy(ABC):
     def __call__(self, observation: ArrayLike) -> Any:
         """Returns the action for an observation [D], as the environment takes it.
 
-        For the pendulum it is the torque in N·m, float64: [1], or [B, 1] for a batch [B, D]. For
+        For the pendulum it is the torque in N·m, float32: [1], or [B, 1] for a batch [B, D]. For
         CartPole it is the action's index: an int, or int64 [B] for a batch.
 
         The observation is an array or a list of numbers, which are rounded to float32.
@@ -100,6 +100,8 @@ class Policy(ABC):
         """
         array = self._validate(observation)
         actions = self.act(np.atleast_2d(array))
+        if actions.dtype.kind == "f":  # the type of the environment's action space
+            actions = actions.astype(np.float32)
         return np.asarray(actions if array.ndim == 2 else actions[0]), state
 
     def _validate(self, observation: ArrayLike) -> NDArray[np.float32]:

@@ -17,7 +17,7 @@ from keras_pendulum.optimum.solutions import solution
 FINER_TORQUE_GAIN = 0.002
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Score:
     """The undiscounted returns of whole episodes."""
 

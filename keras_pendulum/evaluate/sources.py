@@ -11,6 +11,7 @@ import keras
 from numpy.typing import ArrayLike
 
 from keras_pendulum.dqn.network import DQN
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.errors import ConfigError, UnknownLayersError, UserError, WeightsError, one_line
 from keras_pendulum.evaluate.answers import is_instance
 from keras_pendulum.evaluate.policy import Policy
@@ -65,6 +66,13 @@ def as_policy(source: Any, torques: ArrayLike | None = None, name: str | None = 
     if isinstance(source, keras.Model) or is_instance(source, "tf_keras", "Model"):
         if not source.built:
             raise UserError("the Keras model has no weights yet: build it or load them first")
+        shape = getattr(source, "input_shape", None)
+        size = len(Pendulum.observation_names)
+        if isinstance(shape, tuple) and shape[-1] not in (None, size):
+            raise UserError(
+                f"the Keras model takes inputs of the shape {shape}; an observation of "
+                f"{Pendulum.environment} has {size} numbers"
+            )
         return QPolicy(partial(source, training=False), torques, name or source.name)
     if isinstance(source, type):
         raise TypeError(one_line(f"agent is the class {source.__name__}; {_EXPECTED}"))

@@ -13,6 +13,7 @@ from pathlib import Path
 from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
 from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.errors import UserError
+from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
@@ -73,9 +74,10 @@ def _write(arguments: argparse.Namespace) -> int:
     training = training_content(run, network) if run else None
     name = path.resolve().parent.name if run else None
     if arguments.against is not None:
-        other = find_weights(arguments.against)
+        other = find_weights(arguments.against)  # also the folder of a run
         against = (load_weights(other), other)
-    page = build_page(network, path, arguments.gravity, against, training, name)
+    with status("Computing the optimum for the page"):
+        page = build_page(network, path, arguments.gravity, against, training, name)
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")

@@ -32,6 +32,8 @@ def write_atomically(
     Raises UserError when the file system refuses, or when something else than a file is at `path`,
     such as a folder, a pipe or a device. What is at `path` is then unchanged.
     """
+    if not os.fspath(path):
+        raise UserError("the name of the file is empty")
     target = Path(os.path.realpath(path))
     # Few digits, because Windows limits the length of a path.
     temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.tmp")

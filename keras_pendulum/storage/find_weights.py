@@ -5,20 +5,27 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import WeightsError, did_you_mean
 from keras_pendulum.storage.shipped_weights import shipped_folder, shipped_names
 
 
 def find_weights(name: str | os.PathLike[str]) -> Path:
-    """Returns the path of a weights file: `name` itself, or the shipped file `name.h5`.
+    """Returns the path of a weights file.
 
-    Raises WeightsError when neither exists.
+    `name` is the file, the folder of a run, or a shipped file without `.h5`.
+
+    Raises WeightsError when none of them exists.
     """
     name = os.fspath(name)
+    if not name:
+        raise WeightsError("the name of the weights file is empty")
     path = Path(name)
     try:
         if path.is_file():
             return path
+        if len(checkpoints := checkpoints_in(path)) == 1:
+            return path / checkpoints[0]
     except OSError as error:  # a name that no file can have
         raise WeightsError(f"{name}: {error.strerror}; expected a weights file (.h5)") from error
     shipped = name.removesuffix(".h5")
@@ -31,3 +38,9 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
     problem = "not a file" if path.exists() else "no such file"
     meant = did_you_mean(name, shipped_names())
     raise WeightsError(f"{name}: {problem}; expected a weights file (.h5){meant}")
+
+
+def checkpoints_in(folder: Path) -> list[str]:
+    """Returns the names of the checkpoints in the folder of a run. Raises OSError as it is read."""
+    names = [task.weights_name for task in TASKS.values()]
+    return [name for name in names if (folder / name).is_file()]

@@ -52,8 +52,8 @@ def load_weights(path: str | os.PathLike[str], activation: str | None = None) ->
             )
     elif activation not in (None, recorded):
         raise WeightsError(
-            f"{name}: records the activation {recorded}, not {activation}, for "
-            f"{_task(info).environment}: give it with --activation {recorded}"
+            f"{name}: holds a network for {_task(info).environment} with the activation "
+            f"{recorded}, not {activation}"
         )
     widths = [layer.bias.shape[0] for layer in layers]
     network = DQN(

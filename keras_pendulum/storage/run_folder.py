@@ -9,6 +9,7 @@ import contextlib
 import json
 import math
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -19,6 +20,7 @@ from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.history import EpisodeRecord, csv_header
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
+from keras_pendulum.storage.find_weights import checkpoints_in
 from keras_pendulum.storage.folder_lock import lock_folder
 from keras_pendulum.storage.snapshots import snapshots_file
 
@@ -35,6 +37,8 @@ class RunFolder:
     """
 
     def __init__(self, path: str | os.PathLike[str], environment: str) -> None:
+        if not os.fspath(path):
+            raise UserError("the name of the run's folder is empty")
         self.path = Path(path)
         # The real path: a link that changes during the run must not change the folder.
         self._real_path = Path(os.path.realpath(path))
@@ -137,6 +141,17 @@ class RunFolder:
         write_atomically(self.config, (json.dumps(asdict(config), indent=2) + "\n").encode())
         self._write_history(history)
 
+    def warn_if_edited(self, config: Config) -> None:
+        """Warns when config.json does not hold these settings, those of the checkpoint."""
+        with contextlib.suppress(OSError, ValueError, RecursionError):
+            found = json.loads(self.config.read_text(encoding="utf-8"))
+            if found != json.loads(json.dumps(asdict(config))):
+                warnings.warn(
+                    f"{self.path / self.config.name} is not used: the settings of the run are in "
+                    "its checkpoint; change one by its flag",
+                    stacklevel=2,
+                )
+
     def append(self, record: EpisodeRecord) -> None:
         """Adds a row to history.csv, unless the file was removed; see `restore_history`.
 
@@ -181,7 +196,7 @@ def find_run(path: str | os.PathLike[str]) -> RunFolder:
     folder = Path(path)
     names = {task.weights_name: task.environment for task in TASKS.values()}
     try:
-        found = [name for name in names if (folder / name).is_file()]
+        found = checkpoints_in(folder)
         if not found and not folder.is_dir():
             kind = "a file" if folder.exists() else "no such folder"
             raise UserError(f"{folder}: {kind}; expected the folder of a run")

@@ -38,6 +38,8 @@ def save_weights(
     """
     require_type("network", network, DQN)
     require_type("path", path, (str, os.PathLike))
+    if os.fspath(path).lower().endswith(".keras"):
+        raise UserError(f"{path}: this writes HDF5, not a .keras file; name it FILE.h5")
     content = encode_weights(network, network.get_weights(), evaluated_return=evaluated_return)
 
     def read_back(file: Path) -> None:

@@ -166,5 +166,7 @@ def _parse_arm(text: str) -> Arm:
             raise ConfigError(f"the arm {name.strip()!r} has {word!r}; expected field=value")
         if field in _REFUSED:
             raise ConfigError(f"the arm {name.strip()!r} cannot set {field}: {_REFUSED[field]}")
+        if field in settings:
+            raise ConfigError(f"the arm {name.strip()!r} sets {field} twice")
         settings[field] = parse_setting(field, value)
     return Arm(name.strip(), preset(words[0], **settings))

@@ -88,7 +88,10 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.resume:
         if arguments.preset:
             settings["preset"] = arguments.preset
-        config = load_recorded_run(_run_to_resume(out).weights).config.change(**settings)
+        run = _run_to_resume(out)
+        config = load_recorded_run(run.weights).config
+        run.warn_if_edited(config)
+        config = config.change(**settings)
     # A run with one update in a call gains little; `original` needs one thread to repeat the
     # recorded run to its end.
     if config.train_frequency == "episode" and config.updates_per_episode > 1:

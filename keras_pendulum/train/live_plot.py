@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.display import require_display
+from keras_pendulum.display import in_notebook, require_display
 from keras_pendulum.train.listeners import Listener
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ class LivePlot(Listener):
         self.config = config
         self._history: list[EpisodeRecord] = []
         self._levels: dict[str, float] | None = None  # known from the first drawing on
-        self._canvas = _NotebookOutput() if _in_notebook() else _Window()
+        self._canvas = _NotebookOutput() if in_notebook() else _Window()
         self._drawn = 0.0
 
     def on_episode(self, record: EpisodeRecord) -> None:
@@ -107,9 +106,3 @@ class _Window:
                 self._closed = True
                 pygame.display.quit()
         return self._closed
-
-
-def _in_notebook() -> bool:
-    ipython = sys.modules.get("IPython")
-    shell = ipython.get_ipython() if ipython is not None else None
-    return shell is not None and hasattr(shell, "kernel")

@@ -12,6 +12,7 @@ from statistics import fmean, median_low
 from typing import TYPE_CHECKING
 
 from keras_pendulum.config.config import Config
+from keras_pendulum.display import in_notebook
 from keras_pendulum.figures.learning_curve import MEAN_OVER
 from keras_pendulum.train.listeners import Listener
 
@@ -28,7 +29,7 @@ def make_progress(config: Config, quiet: bool = False) -> Progress:
     """Returns a progress bar where one can be drawn, else the original's lines."""
     if quiet:
         return Progress(config)
-    can_draw_over = sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+    can_draw_over = (sys.stdout.isatty() and os.environ.get("TERM") != "dumb") or in_notebook()
     return _Bar(config) if can_draw_over else _Lines(config)
 
 
@@ -38,7 +39,6 @@ class Progress(Listener):
     def __init__(self, config: Config) -> None:
         self._config = config
         self._recent: deque[EpisodeRecord] = deque(maxlen=MEAN_OVER)
-        self._optimum: float | None = None
 
     def on_episode(self, record: EpisodeRecord) -> None:
         """Shows the record of an episode. The phase is `training` again."""
@@ -50,32 +50,18 @@ class Progress(Listener):
     def end(self) -> None:
         """Ends the line, so that other lines can follow."""
 
-    def _mean_return_and_regret(self) -> tuple[float, float]:
-        """Returns the means of the last 10 training episodes, random actions included.
-
-        The regret is NaN where the optimum is not known.
-        """
-        if self._optimum is None:
-            from keras_pendulum.optimum.solutions import solution
-
-            steps = self._config.max_episode_steps
-            self._optimum = solution(self._config.task).mean_best_return(steps)
-        mean = fmean(record.episode_return for record in self._recent)
-        return mean, self._optimum - mean
-
 
 class _Lines(Progress):
-    """The original's line for each episode, and a line with the regret after every 50 of them."""
+    """The original's line for each episode, and a line with the mean return after every 50."""
 
     def on_episode(self, record: EpisodeRecord) -> None:
         super().on_episode(record)
         lines = [record.line()]
         if (record.episode + 1) % _EPISODES_BETWEEN_MEANS == 0:
-            mean, regret = self._mean_return_and_regret()
+            mean = fmean(each.episode_return for each in self._recent)
             lines.append(
                 f"Mean of episodes {self._recent[0].episode} to {record.episode}, random actions "
                 f"included: return {mean:.2f}"
-                + ("" if math.isnan(regret) else f", regret {regret:.2f}")
             )
         if not math.isnan(record.greedy_regret):
             regret = record.greedy_regret
@@ -84,10 +70,10 @@ class _Lines(Progress):
 
 
 class _Bar(Progress):
-    """A line with phase, return, regret, ε, loss, steps per second and remaining time.
+    """A line with phase, return, ε, loss, steps per second and remaining time.
 
-    `regret` is the mean of the last 10 training episodes, random actions included. It is left out
-    where the optimum is not known. `greedy` is the regret of the last evaluation.
+    `greedy` is the regret of the last evaluation. There is no regret of the training episodes: the
+    returns of a few starts differ by more than what is left to learn.
     """
 
     def __init__(self, config: Config) -> None:
@@ -148,9 +134,6 @@ class _Bar(Progress):
         """Returns the texts to the right of the bar, by name."""
         first, last = self._recent[0], self._recent[-1]
         figures = {"return": f"return {last.episode_return:.4g}"}
-        _, regret = self._mean_return_and_regret()
-        if not math.isnan(regret):
-            figures["regret"] = f"regret {regret:.4g}"
         if not math.isnan(self._greedy_regret):
             figures["greedy"] = f"greedy {self._greedy_regret:.4g}"
         figures["ε"] = f"ε {last.epsilon:.2f}"

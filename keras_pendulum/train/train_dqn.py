@@ -22,10 +22,11 @@ from keras_pendulum.train.evaluations import greedy_regret
 from keras_pendulum.train.folder_files import run_listeners
 from keras_pendulum.train.listeners import FunctionListener, Listener, Phase
 from keras_pendulum.train.loop import train_episodes
+from keras_pendulum.train.progress import make_progress
 from keras_pendulum.train.run import Run, make_run
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrainingResult:
     """The trained network, and the record of each episode."""
 
@@ -47,6 +48,7 @@ def train_dqn(
     on_checkpoint: Callable[[DQN, int], None] = lambda network, episode: None,
     on_phase: Callable[[Phase], None] = lambda phase: None,
     should_stop: Callable[[], bool] = lambda: False,
+    progress: bool = False,
 ) -> TrainingResult:
     """Trains a DQN.
 
@@ -64,6 +66,7 @@ def train_dqn(
         on_phase: called with `compiling`, `evaluating` or `drawing` when that phase starts. The
             next record ends the phase.
         should_stop: called after each episode; true ends the run there, with a checkpoint.
+        progress: shows a progress bar on a terminal and in a notebook, else a line per episode.
 
     Raises:
         ConfigError: the settings do not fit `init` or the checkpoint.
@@ -91,6 +94,10 @@ def train_dqn(
     ]
     followers.append(FunctionListener(on_checkpoint=on_checkpoint, on_phase=on_phase))
     with contextlib.ExitStack() as stack:
+        if progress:
+            bar = make_progress(config)
+            followers.append(bar)
+            stack.callback(bar.end)
         if resume:
             if folder is None:
                 raise UserError("resume needs `out`, the folder of the run")
