@@ -1,0 +1,147 @@
+"""What a person types wrong: one line that says what to do."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import gymnasium
+import keras
+import numpy as np
+import pytest
+from conftest import Command
+
+import keras_pendulum as kp
+
+LONG = "n" * 250
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "expected"),
+    [
+        ("evaluate", ("reference", "--torques", "-2,2"), "needs --torques=VALUE"),
+        ("train", ("--ep", "3"), "did you mean --episodes?"),
+        ("evaluate", ("",), "the name of the weights file is empty"),
+        ("evaluate", (LONG,), "no such file"),
+        ("page", ("reference", "--out", f"{LONG}.html"), "File name too long"),
+        ("train", ("--init", "cartpole"), "holds a network for CartPole-v1 with the activation"),
+        ("study", ("--arm", "A: reference tau=0.1 tau=0.2"), "the arm 'A' sets tau twice"),
+    ],
+)
+def test_error_says_what_to_do(
+    command: str, words: tuple[str, ...], expected: str, in_process: Command
+) -> None:
+    result = in_process(command, *words)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert expected in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_empty_names_are_refused_in_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    network = kp.load_weights("reference")
+    for use in (
+        lambda: kp.load_weights(""),
+        lambda: kp.save_weights(network, ""),
+        lambda: kp.train_dqn(kp.preset(episodes=1), out=""),
+    ):
+        with pytest.raises(kp.UserError, match="is empty"):
+            use()
+    assert not list(tmp_path.iterdir())
+
+
+def test_name_of_another_format_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(kp.UserError, match="name it FILE"):
+        kp.save_weights(kp.load_weights("reference"), tmp_path / "network.keras")
+
+
+def test_keras_model_of_other_inputs_is_named() -> None:
+    model = keras.Sequential([keras.layers.Input((4,)), keras.layers.Dense(5)])
+    with pytest.raises(kp.UserError, match=r"inputs of the shape \(None, 4\)"):
+        kp.evaluate_policy(model, 1)
+    with pytest.raises(kp.UserError, match="expected axis -1 of input shape") as error:
+        kp.evaluate_policy(kp.q_function(model), 1)
+    assert "\x1b" not in str(error.value) and r"\x1b" not in str(error.value)
+    assert "Arguments received" not in str(error.value)
+
+
+@pytest.mark.parametrize("excess", [2e-7, 1e-6])
+def test_torque_within_rounding_is_the_limit(excess: float) -> None:
+    expected = kp.evaluate_policy(lambda observation: 2.0, 1).mean_return
+    assert kp.evaluate_policy(lambda observation: 2.0 + excess, 1).mean_return == expected
+    outputs = kp.q_function(lambda batch: np.eye(2)[[1] * len(batch)], torques=[-2, 2 + excess])
+    assert kp.evaluate_policy(outputs, 1).mean_return == expected
+
+
+def test_torque_beyond_rounding_is_shown_with_its_digits() -> None:
+    with pytest.raises(kp.UserError, match=r"the torque 2\.0001 N·m"):
+        kp.evaluate_policy(lambda observation: 2.0001, 1)
+
+
+def test_run_folder_is_an_agent_everywhere(tmp_path: Path, in_process: Command) -> None:
+    config = kp.preset("reference", hidden_units=(8,), episodes=2)
+    network = kp.train_dqn(config, tmp_path / "run").network
+    regret = kp.evaluate_policy(network, 2).regret
+    assert kp.evaluate_policy(tmp_path / "run", 2).regret == regret
+    printed = in_process("evaluate", "run", "--episodes", "2", "--json").stdout
+    assert json.loads(printed)["regret"] == regret
+    result = in_process("page", "reference", "--against", "run")
+    assert result.returncode == 0, result.stderr
+
+
+def test_edited_config_json_is_said_to_be_unused(tmp_path: Path, in_process: Command) -> None:
+    words = ("train", "--hidden-units", "8", "--episodes", "1", "--out", "run", "--quiet")
+    assert in_process(*words).returncode == 0
+    resume = ("train", "--resume", "--out", "run", "--quiet", "--episodes")
+    assert "config.json" not in in_process(*resume, "2").stderr
+    file = tmp_path / "run" / "config.json"
+    file.write_text(file.read_text().replace('"discount": 0.9', '"discount": 0.5'))
+    result = in_process(*resume, "3")
+    assert result.returncode == 0
+    assert "config.json is not used" in result.stderr
+    assert json.loads(file.read_text())["discount"] == 0.9
+
+
+def test_action_is_in_the_action_space() -> None:
+    env = gymnasium.make("Pendulum-v1")
+    policy = kp.load_policy("reference")
+    assert env.action_space.contains(policy(env.reset(seed=0)[0]))
+
+
+def test_results_can_be_compared_and_pickled() -> None:
+    scores = [kp.evaluate_policy("reference", 1) for _ in range(2)]
+    assert scores[0] == scores[0] != scores[1]
+    for agent in ("original", lambda observation: 0.0, kp.q_function(lambda batch: batch)):
+        diagnosis = kp.diagnose(agent)
+        copied = pickle.loads(pickle.dumps(diagnosis))
+        assert copied.summary() == diagnosis.summary()
+        assert len(copied.figure().axes) == len(diagnosis.figure().axes)
+
+
+def test_regret_is_compared_with_what_the_discount_costs() -> None:
+    healthy = kp.diagnose("reference").verdict
+    assert "No finding: regret" in healthy
+    assert "the discount alone costs 0.25, and up to 8.8 more is little" in healthy
+
+
+def test_picture_that_cannot_be_made_leaves_the_score(
+    in_process: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> bytes:
+        raise RuntimeError("no font")
+
+    monkeypatch.setattr("keras_pendulum.figures.run_figure.draw_run", fail)
+    result = in_process("train", "--hidden-units", "8", "--episodes", "1", "--quiet")
+    assert result.returncode == 0
+    assert "Regret: " in result.stdout
+    assert "cannot draw" in result.stderr and "no font" in result.stderr
+
+
+def test_progress_shows_a_line_for_each_episode(capsys: pytest.CaptureFixture[str]) -> None:
+    kp.train_dqn(kp.preset(hidden_units=(8,), episodes=50), progress=True)
+    lines = [
+        line for line in capsys.readouterr().out.splitlines() if line != "" and "\r" not in line
+    ]
+    assert len([line for line in lines if line.startswith("Episode: ")]) == 50
+    assert "regret" not in "\n".join(lines)
