@@ -13,12 +13,11 @@ from collections.abc import Iterator
 from keras_pendulum.errors import UserError
 from keras_pendulum.status import status
 
-THREADS = "TF_NUM_INTRAOP_THREADS"  # the variable
 _ENVIRONMENT = {
     "KERAS_BACKEND": "tensorflow",
     # The number of threads of a matrix product changes its rounding, and one changed digit makes
     # another run. With a fixed number, a run does not depend on the number of cores.
-    THREADS: "1",
+    "TF_NUM_INTRAOP_THREADS": "1",
     # oneDNN chooses its kernels by the processor, and each rounds differently.
     "TF_ENABLE_ONEDNN_OPTS": "0",
     "TF_CPP_MIN_LOG_LEVEL": "3",  # no start-up notes
@@ -29,11 +28,10 @@ if sys.platform == "linux":
     _ENVIRONMENT["SDL_FRAMEBUFFER_ACCELERATION"] = "0"
 # A line of the C++ library absl, such as "I0000 00:00:1795466974.767995    4604 port.cc:153] …".
 _NOTE = re.compile(rb"WARNING: All log messages before absl::|[IWE]\d+ [\d:.]+ +\d+ [^ ]+:\d+\] ")
-_ROUNDING = (THREADS, "TF_ENABLE_ONEDNN_OPTS")
+_ROUNDING = ("TF_NUM_INTRAOP_THREADS", "TF_ENABLE_ONEDNN_OPTS")
 # Whether the user has imported TensorFlow before this package, and without a choice of both.
 _IMPORTED_BEFORE = "tensorflow" in sys.modules
 _MAY_ROUND_OTHERWISE = _IMPORTED_BEFORE and not os.environ.keys() >= set(_ROUNDING)
-_MAY_CHOOSE_THREADS = not _IMPORTED_BEFORE and THREADS not in os.environ
 
 
 _forked_with_tensorflow = False
@@ -65,15 +63,6 @@ def set_environment_defaults() -> None:
     for name, value in _ENVIRONMENT.items():
         if not (_IMPORTED_BEFORE and name.startswith("TF_")):
             os.environ.setdefault(name, value)
-
-
-def use_two_threads() -> None:
-    """Gives TensorFlow two threads, unless the user has chosen their number.
-
-    Call it before the first operation of TensorFlow, which starts the threads.
-    """
-    if _MAY_CHOOSE_THREADS:
-        os.environ[THREADS] = "2"
 
 
 def warn_if_not_reproducible() -> None:

@@ -17,7 +17,7 @@ from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow, use_two_threads
+from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
 from keras_pendulum.train.closing_lines import closing_lines
 from keras_pendulum.train.progress import make_progress
 
@@ -92,10 +92,6 @@ def _train(arguments: argparse.Namespace) -> int:
         config = load_recorded_run(run.weights).config
         run.warn_if_edited(config)
         config = config.change(**settings)
-    # A run with one update in a call gains little; `original` needs one thread to repeat the
-    # recorded run to its end.
-    if config.train_frequency == "episode" and config.updates_per_episode > 1:
-        use_two_threads()
     init = None
     if arguments.init:
         init = load_weights(find_weights(arguments.init), config.activation)
