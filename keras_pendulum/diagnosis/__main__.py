@@ -37,7 +37,10 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "run folder (its history and replay buffer are used, too)",
     )
     parser.add_argument(
-        "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
+        "--gravity",
+        type=float,
+        metavar="G",
+        help="gravity in m/s² [recorded in the file, else the better one of 10 and 1]",
     )
     parser.add_argument(
         "--discount", type=float, metavar="γ", help="discount [recorded in the file, else 0.9]"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -16,7 +16,8 @@ from keras_pendulum.diagnosis.measurement import STARTS, Measurement
 from keras_pendulum.diagnosis.repairs import find_by_repairs
 from keras_pendulum.diagnosis.run_record import read_record
 from keras_pendulum.diagnosis.states import observe
-from keras_pendulum.environments.pendulum import require_pendulum
+from keras_pendulum.environments.pendulum import Pendulum, require_pendulum
+from keras_pendulum.evaluate.evaluation import find_task
 from keras_pendulum.evaluate.sources import as_policy
 from keras_pendulum.storage.run_folder import find_run_if_folder
 
@@ -38,6 +39,7 @@ class Diagnosis:
     findings: list[Finding]  #: the strongest first
     notes: list[Finding]  #: what costs little
     limits: list[str]  #: what could not be determined
+    assumption: str = ""  #: says which task was assumed, for an agent that records none
 
     @property
     def verdict(self) -> str:
@@ -63,6 +65,7 @@ class Diagnosis:
             f"Agent {measurement.policy.name}, g = {measurement.task.gravity:g}, "
             f"γ = {measurement.discount:g}, {STARTS} starts; "
             f"the discount alone costs {measurement.discount_cost:.2f}.",
+            *([f"{self.assumption}."] if self.assumption else []),
         ]
         for number, finding in enumerate(self.findings, 1):
             lines += ["", f"{number}. {finding.name}", f"   Evidence: {finding.evidence}"]
@@ -123,7 +126,8 @@ def diagnose(
     Args:
         agent: what `evaluate_policy` takes, or a run folder (its history and replay buffer are
             used, too).
-        gravity: declared g in m/s²; None takes the recorded one, else 1.
+        gravity: declared g in m/s²; None takes the recorded one, else the better one of 10 and 1,
+            and the summary says so.
         discount: declared γ; None takes the recorded one, else 0.9.
         torques: N·m of the outputs, as in `evaluate_policy`.
 
@@ -133,13 +137,15 @@ def diagnose(
     folder = find_run_if_folder(agent)
     record = None if folder is None else read_record(folder)
     policy = as_policy(agent if folder is None else folder.weights, torques)
-    task = require_pendulum(policy.task, policy.name, "diagnose is for Pendulum-v1")
-    task = task.with_gravity(gravity)
+    require_pendulum(policy.task, policy.name, "diagnose is for Pendulum-v1")
+    task, assumption = find_task(policy, gravity)
+    assert isinstance(task, Pendulum)
     if discount is None:
         discount = policy.info.discount
     discount = Config.discount if discount is None else Number(0, 1).validate("discount", discount)
     scale = policy.info.reward_scale
-    return diagnose_measurement(Measurement(policy, task, discount, scale, record))
+    diagnosis = diagnose_measurement(Measurement(policy, task, discount, scale, record))
+    return replace(diagnosis, assumption=assumption)
 
 
 def diagnose_measurement(measurement: Measurement) -> Diagnosis:

@@ -49,7 +49,10 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         help="seed of the first start; episode i starts from seed N + i [0]",
     )
     parser.add_argument(
-        "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
+        "--gravity",
+        type=float,
+        metavar="G",
+        help="gravity in m/s² [recorded in the file, else the better one of 10 and 1]",
     )
     parser.add_argument(
         "--discount",

@@ -50,7 +50,14 @@ def failure(error: BaseException) -> str:
 def torques_of(answer: Any, batch: Batch) -> NDArray[np.float64]:
     """Returns the torques in N·m of the shape `batch`. Raises ActionError for anything else."""
     each = f" for each of {batch[0]} observations" if batch else ""
-    torques = _numbers(answer, batch, f"expected a torque in N·m{each}").astype(np.float64)
+    numbers = _numbers(answer, batch, f"expected a torque in N·m{each}")
+    if numbers.dtype.kind in "iu":
+        raise _wrong(
+            f"the integer {numbers.flat[0]}",
+            "expected a torque as a floating-point number; for an index, give the torques that the "
+            "indices stand for (torques=, --torques)",
+        )
+    torques = numbers.astype(np.float64)
     valid = np.abs(torques) <= MAX_TORQUE + ROUNDING  # false for NaN too
     if not valid.all():
         row = int(valid.argmin())

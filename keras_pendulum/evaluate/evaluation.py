@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum.config.fields import Integer, Number
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError, UserError
 from keras_pendulum.evaluate.answers import ActionError
 from keras_pendulum.evaluate.policy import Policy
@@ -22,7 +24,9 @@ from keras_pendulum.status import Report
 
 Env = gymnasium.Env[Any, Any]
 OnStep = Callable[[Env], None]
+USUAL_GRAVITIES = (10.0, 1.0)  # m/s², Gymnasium's default and that of the presets
 _SIDE_BY_SIDE = 100  # episodes
+_STARTS_OF_A_TRIAL = 5
 
 
 def evaluate_policy(
@@ -44,7 +48,8 @@ def evaluate_policy(
             function from observation to torque, a `q_function`, or an object with `predict`.
         episodes: number of episodes.
         seed: seed of the first start.
-        gravity: m/s², for the pendulum; None takes the agent's recorded gravity, else 1.
+        gravity: m/s², for the pendulum; None takes the agent's recorded gravity, else the better
+            one of 10 and 1, and the summary says so.
         discount: γ that the agent learned with; None takes the recorded one, if there is one.
         torques: N·m, what the agent's outputs stand for; None takes `linspace(-2, 2, A)`.
         render_mode: Gymnasium's.
@@ -63,7 +68,7 @@ def evaluate_policy(
     policy = as_policy(agent, torques)
     episodes = Integer(1, 1_000_000).validate("episodes", episodes)
     seed = Integer(0, 2**32 - episodes).validate("seed", seed)
-    task = policy.task.with_gravity(gravity)
+    task, assumption = find_task(policy, gravity)
     if discount is None:
         discount = policy.info.discount
     elif not task.has_exact_values:
@@ -73,8 +78,47 @@ def evaluate_policy(
     else:
         discount = Number(0, 1).validate("discount", discount)
     seeds = range(seed, seed + episodes)
+    returns = _play(policy, task, seeds, render_mode, on_step, on_progress)
+    best = solution(task).best_returns(seeds)
+    return Score(task, returns, best, discount, seeds, assumption)
+
+
+def find_task(policy: Policy, gravity: float | None) -> tuple[Task, str]:
+    """Returns the task of a policy, and a sentence where it is assumed.
+
+    For a policy that records no task, without a declared gravity in m/s², it is the usual one at
+    which the policy gains most of what can be gained over random torques.
+
+    Raises ConfigError for a gravity out of range, or where the task has none.
+    """
+    if policy.info.task is not None or gravity is not None:
+        return policy.task.with_gravity(gravity), ""
+    seeds = range(_STARTS_OF_A_TRIAL)
+    gained = {}
+    for task in map(Pendulum, USUAL_GRAVITIES):
+        exact = solution(task)
+        random, best = exact.random_return(), float(exact.best_returns(seeds).mean())
+        gained[task] = (float(_play(policy, task, seeds).mean()) - random) / (best - random)
+    first, second = sorted(gained, key=lambda task: gained[task], reverse=True)
+    return first, (
+        f"The agent records no gravity. It gains {gained[first]:.0%} of what can be gained over "
+        f"random torques at g = {first.gravity:g}, and {gained[second]:.0%} at g = "
+        f"{second.gravity:g}: declare yours with gravity= (--gravity)"
+    )
+
+
+def _play(
+    policy: Policy,
+    task: Task,
+    seeds: range,
+    render_mode: str | None = None,
+    on_step: OnStep | None = None,
+    on_progress: Report = lambda share: None,
+) -> NDArray[np.float64]:
+    """Returns the undiscounted returns of the episodes from these seeds."""
     # One episode after the other where it is watched, or the policy needs it. Otherwise the policy
     # gets the observations of many episodes of the same length in one call.
+    episodes = len(seeds)
     alone = policy.one_by_one or render_mode is not None or on_step is not None
     count = 1 if alone else min(_SIDE_BY_SIDE, episodes)
 
@@ -86,13 +130,12 @@ def evaluate_policy(
             stack.enter_context(contextlib.closing(task.make_env(render_mode)))
             for _ in range(count)
         ]
-        returns = np.concatenate(
+        return np.concatenate(
             [
                 _returns(policy, envs, seeds[first : first + count], first, on_step, report)
                 for first in range(0, episodes, count)
             ]
         )
-    return Score(task, returns, solution(task).best_returns(seeds), discount, seeds)
 
 
 def _returns(

@@ -26,6 +26,7 @@ class Score:
     optimal_returns: NDArray[np.float64]  #: [episodes]; with 41 torques; 500 for CartPole
     discount: float | None = None  #: γ that the policy learned with, where it is known
     seeds: range | None = None  #: of the starts
+    assumption: str = ""  #: says which task was assumed, for an agent that records none
 
     @property
     def environment(self) -> str:
@@ -102,7 +103,7 @@ class Score:
         }
 
     def summary(self) -> str:
-        """Returns the lines that `evaluate` prints: three, and a fourth for a known discount."""
+        """Returns the lines that `evaluate` prints: three, and one more for a known discount."""
         regret = f"{self.regret:.2f}"
         if self.regret < 0:
             regret = f"0.00 (the mean return is {-self.regret:.4f} above the best known one: "
@@ -117,6 +118,7 @@ class Score:
             f"Greedy on {len(self.returns)} fixed starts, {self.task.name}"
             f": mean return {self.mean_return:.2f} (standard deviation {self.std_return:.2f}, "
             f"median {self.median_return:.2f}, worst {self.worst_return:.2f})",
+            *([self.assumption] if self.assumption else []),
             f"Best possible on the same starts: {self.optimal_mean_return:.2f}",
             f"Regret: {regret}",
         ]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.errors import ConfigError, UnknownLayersError, UserError, WeightsError, one_line
+from keras_pendulum.errors import UnknownLayersError, UserError, WeightsError, one_line
 from keras_pendulum.evaluate.answers import is_instance
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.q_policies import DQNPolicy, QPolicy
@@ -82,9 +82,7 @@ def as_policy(source: Any, torques: ArrayLike | None = None, name: str | None = 
         raise TypeError("agent is a PyTorch module; give kp.q_function(module, torques=...)")
     if not callable(source):
         raise TypeError(one_line(f"agent is {source!r}; {_EXPECTED}"))
-    if torques is not None:
-        raise ConfigError("torques are given, but the agent is a function that returns torques")
-    return FunctionPolicy(source)
+    return FunctionPolicy(source, torques)
 
 
 def load_keras_file(

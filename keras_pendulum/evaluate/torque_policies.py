@@ -13,6 +13,7 @@ from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.answers import (
     ActionError,
+    Batch,
     call_agent,
     indices_of,
     is_instance,
@@ -25,13 +26,21 @@ from keras_pendulum.storage.run_info import RunInfo
 
 
 class FunctionPolicy(Policy):
-    """A function from one observation [3] to a torque in N·m. It may have a state."""
+    """A function from one observation [3] to a torque in N·m, or to the index of one.
+
+    It may have a state. With `torques`, its answers are indices of them.
+    """
 
     one_by_one = True
 
-    def __init__(self, source: Any, info: RunInfo | None = None) -> None:
+    def __init__(
+        self, source: Any, torques: ArrayLike | None = None, info: RunInfo | None = None
+    ) -> None:
         super().__init__(name_of(source), info)
         self._source = source
+        self._first = 0  # the integer that stands for index 0
+        if torques is not None:
+            self.actions = torque_actions(torques)
 
     def act(self, observations: Observations) -> NDArray[np.float64]:
         """Returns the torques [B, 1]. Raises ActionError for an answer that is not a torque."""
@@ -48,7 +57,14 @@ class FunctionPolicy(Policy):
 
     def _torques(self, observations: Observations) -> NDArray[np.float64]:
         """Returns the torques in N·m: [B] for observations [B, 3], [] for [3]."""
-        return torques_of(call_agent(self._source, observations), observations.shape[:-1])
+        return self._read(call_agent(self._source, observations), observations.shape[:-1])
+
+    def _read(self, answer: Any, batch: Batch) -> NDArray[np.float64]:
+        """Returns the torques in N·m that an answer stands for."""
+        if self.actions is None:
+            return torques_of(answer, batch)
+        indices = indices_of(answer, batch, self.actions.count, self._first)
+        return np.asarray(self.actions.values[indices, 0])
 
 
 class PredictPolicy(FunctionPolicy):
@@ -66,7 +82,8 @@ class PredictPolicy(FunctionPolicy):
 
     def __init__(self, source: Any, torques: ArrayLike | None) -> None:
         gamma = getattr(source, "gamma", None)
-        super().__init__(source, RunInfo(settings={} if gamma is None else {"discount": gamma}))
+        info = RunInfo(settings={} if gamma is None else {"discount": gamma})
+        super().__init__(source, info=info)
         shape = getattr(getattr(source, "observation_space", None), "shape", (3,))
         if shape is None or tuple(shape) != (3,):
             raise ConfigError(f"{self.name} takes observations of the shape {shape}; expected (3,)")
@@ -96,11 +113,7 @@ class PredictPolicy(FunctionPolicy):
             raise ActionError(
                 f"predict returned a {name_of(type(answer))}; expected a pair (action, state)"
             )
-        batch = observations.shape[:-1]
-        if self.actions is None:
-            return torques_of(answer[0], batch)
-        indices = indices_of(answer[0], batch, self.actions.count, self._first)
-        return np.asarray(self.actions.values[indices, 0])
+        return self._read(answer[0], observations.shape[:-1])
 
 
 def has_predict(source: Any) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,15 +58,20 @@ class Solution(ABC):
 
     def random_return(self, steps: int | None = None) -> float:
         """Returns the mean return of uniformly random actions from the starts of seeds 0 to 99."""
-        random, actions = np.random.RandomState(0), self.task.actions()
-        env = self.task.make_env(steps=steps)
-        total = 0.0
-        for seed in range(RANDOM_EPISODES):
-            env.reset(seed=seed)
-            done = False
-            while not done:
-                action = actions.to_env_action(random.randint(actions.count))
-                _, reward, terminated, truncated, _ = env.step(action)
-                total += float(reward)
-                done = terminated or truncated
-        return total / RANDOM_EPISODES
+        return _random_return(self.task, steps)
+
+
+@cache
+def _random_return(task: Task, steps: int | None) -> float:
+    random, actions = np.random.RandomState(0), task.actions()
+    env = task.make_env(steps=steps)
+    total = 0.0
+    for seed in range(RANDOM_EPISODES):
+        env.reset(seed=seed)
+        done = False
+        while not done:
+            action = actions.to_env_action(random.randint(actions.count))
+            _, reward, terminated, truncated, _ = env.step(action)
+            total += float(reward)
+            done = terminated or truncated
+    return total / RANDOM_EPISODES
