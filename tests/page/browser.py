@@ -13,11 +13,13 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
 
 from keras_pendulum.page import __main__ as page_command
 
 WEB = Path(page_command.__file__).parent / "web"
+TIE = 1e-5  # floating-point rounding may change the order of Q-values closer than this
 SCREENS = [(1280, 657), (390, 844), (844, 390)]
 
 
@@ -63,6 +65,10 @@ class Player:
         """Opens a page and waits until it is painted: before that, the browser drops keys."""
         self.driver.get(address)
         wait_for(lambda: self.run("return performance.getEntriesByType('paint').length > 0"))
+
+    def open_paused(self, address: str) -> None:
+        self.open(address)
+        self.press(Keys.SPACE)
 
     def find(self, id: str) -> WebElement:
         return self.driver.find_element(By.ID, id)
@@ -118,6 +124,14 @@ class Player:
             seconds,
         )
         return int(step)
+
+    def boxes(self, *selectors: str) -> list[dict[str, float]]:
+        """Returns the left, right, top, bottom, width, … of each element on the screen, in px."""
+        found: list[dict[str, float]] = self.run(
+            "return [...arguments].map(s => document.querySelector(s).getBoundingClientRect())",
+            *selectors,
+        )
+        return found
 
     def redraw(self) -> None:
         """Waits until a frame has drawn everything anew."""

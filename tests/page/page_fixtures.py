@@ -22,18 +22,24 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Weights files by name: two shipped ones, and a small one with other sizes and settings."""
-
+    """Weights files by name: two shipped ones, and small ones, one with other settings."""
+    folder, random = tmp_path_factory.mktemp("files"), np.random.RandomState(0)
     small = kp.DQN((24, 7), 16, activation="relu", metadata={"gravity": 3.5, "preset": "mine"})
-    random = np.random.RandomState(0)
-    small.set_weights([random.normal(size=w.shape) for w in small.get_weights()])
-    # Characters with a meaning in HTML.
-    path = tmp_path_factory.mktemp("files") / "<!--<script>&.h5"
-    kp.save_weights(small, path)
+    networks = {
+        "<!--<script>&.h5": small,  # characters with a meaning in HTML
+        "one.h5": kp.DQN((24,), metadata={"gravity": 1.0}),
+        "two.h5": kp.DQN((16, 8), metadata={"gravity": 1.0}),
+    }
+    for name, network in networks.items():
+        network.set_weights([random.normal(size=w.shape) for w in network.get_weights()])
+        kp.save_weights(network, folder / name, -1234.5)
     return {
         "reference": kp.find_weights("reference"),
         "swingup": kp.find_weights("swingup"),
-        "small": path,
+        "swingup with the exact optimum": kp.find_weights("swingup"),
+        "small": folder / "<!--<script>&.h5",
+        "one": folder / "one.h5",
+        "two": folder / "two.h5",
     }
 
 
@@ -54,30 +60,26 @@ class _Pages(dict[str, str]):
         from keras_pendulum.page import __main__ as page_command
 
         out = self._folder / f"{name}.html"
+        first, _, second = name.partition(" against ")
+        against = ["--against", str(self._files[second])] if second else []
         with pytest.MonkeyPatch.context() as patched:
-            if name == "small":
+            if "exact" not in name:
                 coarse_optimum(patched)
-            assert page_command.main([str(self._files[name]), "--out", str(out)]) == 0
+            assert page_command.main([str(self._files[first]), *against, "--out", str(out)]) == 0
         self[name] = out.as_uri()
         return self[name]
 
 
 @pytest.fixture(scope="session")
 def pages(files: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The addresses of the pages of `files`."""
+    """The addresses of the pages of `files`, and of pairs such as `one against two`."""
     return _Pages(files, tmp_path_factory.mktemp("pages"))
 
 
-@pytest.fixture(scope="session")
-def duel(tmp_path_factory: pytest.TempPathFactory) -> str:
+@pytest.fixture
+def duel(pages: dict[str, str]) -> str:
     """The address of a page with two networks."""
-    from keras_pendulum.page import __main__ as page_command
-
-    out = tmp_path_factory.mktemp("duel") / "page.html"
-    command = ["reference", "--against", "original", "--out", str(out)]
-    assert page_command.main(command) == 0
-    assert out.stat().st_size < 2_500_000
-    return out.as_uri()
+    return pages["one against two"]
 
 
 @pytest.fixture(scope="session")
@@ -109,3 +111,10 @@ def player(chromium: webdriver.Chrome) -> Iterator[Player]:
     errors = player.log("browser")
     chromium.get("about:blank")  # an open page goes on drawing, which slows other tests
     assert errors == []
+
+
+@pytest.fixture
+def user(pages: dict[str, str], player: Player) -> Player:
+    """A player on the page of the small network, whose time is paused."""
+    player.open_paused(pages["small"])
+    return player

@@ -92,19 +92,17 @@ def test_key_that_is_held_acts_once_and_does_not_scroll(
     assert player.text("status") == status
 
 
-def test_new_random_start_follows_the_last_step(pages: dict[str, str], player: Player) -> None:
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
-    player.run("pendulum.reset(1, 0); for (let i = 0; i < 199; i++) pendulum.step()")
-    player.press("t", "s")
-    wait_for(lambda: player.text("step") == "200/200")
-    total = player.state()["return"]
-    assert player.text("score").startswith(f"Score: you and network {shown(total)} · network −")
+def test_new_random_start_follows_the_last_step(user: Player) -> None:
+    user.run("pendulum.reset(1, 0); for (let i = 0; i < 199; i++) pendulum.step()")
+    user.press("t", "s")
+    wait_for(lambda: user.text("step") == "200/200")
+    total = user.state()["return"]
+    assert user.text("score").startswith(f"Score: you and network {shown(total)} · network −")
     starts = []
     for _ in range(20):
-        player.run("pendulum.reset(); for (let i = 0; i < 200; i++) pendulum.step()")
-        player.press("s")
-        starts.append(player.state())
+        user.run("pendulum.reset(); for (let i = 0; i < 200; i++) pendulum.step()")
+        user.press("s")
+        starts.append(user.state())
     assert {start["steps"] for start in starts} == {0}
     angles = [start["theta"] for start in starts]
     speeds = [start["thetadot"] for start in starts]
@@ -112,31 +110,27 @@ def test_new_random_start_follows_the_last_step(pages: dict[str, str], player: P
     assert -1 <= min(speeds) < -0.3 < 0.3 < max(speeds) <= 1
 
 
-def test_score_stays_while_time_runs_on(pages: dict[str, str], player: Player) -> None:
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
-    player.run("pendulum.reset(1, 0); for (let i = 0; i < 198; i++) pendulum.step()")
-    assert player.text("score") == "The score comes after 200 steps."
-    player.run("pendulum.page.step(); pendulum.page.step(); pendulum.page.running = true")
-    assert player.state()["over"]
-    score = player.text("score")
+def test_score_stays_while_time_runs_on(user: Player) -> None:
+    user.run("pendulum.reset(1, 0); for (let i = 0; i < 198; i++) pendulum.step()")
+    assert user.text("score") == "The score comes after 200 steps."
+    user.run("pendulum.page.step(); pendulum.page.step(); pendulum.page.running = true")
+    assert user.state()["over"]
+    score = user.text("score")
     assert score.startswith("Score: network −")
-    player.pass_time(4)
-    assert not player.state()["over"]  # the next episode, after a rest
-    assert player.text("score") == score
+    user.pass_time(4)
+    assert not user.state()["over"]  # the next episode, after a rest
+    assert user.text("score") == score
 
 
-def test_score_has_the_network_from_your_start(pages: dict[str, str], player: Player) -> None:
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
+def test_score_has_the_network_from_your_start(user: Player) -> None:
     episode = "pendulum.reset(1, 0); for (let i = 0; i < 200; i++) pendulum.step()"
-    player.run(episode)
-    network = player.state()["return"]
-    player.press("l")
-    player.run(episode)
-    you = player.state()["return"]
+    user.run(episode)
+    network = user.state()["return"]
+    user.press("l")
+    user.run(episode)
+    you = user.state()["return"]
     assert you < network
-    assert player.text("score").startswith(f"Score: you {shown(you)} · network {shown(network)} · ")
+    assert user.text("score").startswith(f"Score: you {shown(you)} · network {shown(network)} · ")
 
 
 def test_tab_focuses_every_control_in_order_with_an_outline(

@@ -1,27 +1,26 @@
-"""What the page draws: pendulum, bars and axes."""
+"""What the page draws: pendulum, bars, axes and phase portrait."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from browser import Player, pixels_of
+from browser import TIE, Player, pixels_of
+from conftest import wait_for
 from numpy.typing import NDArray
-from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
+from keras_pendulum.dqn.policy import greedy_policy
+from keras_pendulum.environments.actions import TorqueGrid
 from keras_pendulum.environments.pendulum import Pendulum
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.8, -2.0, 3.0])
-def test_pendulum_points_where_gymnasium_draws_it(
-    theta: float, pages: dict[str, str], player: Player
-) -> None:
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
-    player.run("pendulum.reset(arguments[0], 0)", theta)
-    rod = pixels_of(player, "pendulum", "rod")
+def test_pendulum_points_where_gymnasium_draws_it(theta: float, user: Player) -> None:
+    user.run("pendulum.reset(arguments[0], 0)", theta)
+    rod = pixels_of(user, "pendulum", "rod")
     env: Any = Pendulum().make_env(render_mode="rgb_array")
     env.reset(seed=0)
     env.unwrapped.state = np.array([theta, 0.0])
@@ -39,13 +38,11 @@ def direction(mask: NDArray[np.bool_]) -> complex:
 
 @pytest.mark.parametrize(("key", "side"), [("l", 1), ("j", -1)])
 def test_arrow_of_a_positive_torque_turns_counter_clockwise(
-    key: str, side: int, pages: dict[str, str], player: Player
+    key: str, side: int, user: Player
 ) -> None:
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
-    player.run("pendulum.reset(0, 0)")
-    player.press(key, "s")
-    arrow = pixels_of(player, "pendulum", "plus" if side > 0 else "minus")
+    user.run("pendulum.reset(0, 0)")
+    user.press(key, "s")
+    arrow = pixels_of(user, "pendulum", "plus" if side > 0 else "minus")
     # The arrow is below the pivot: its wide head is on the right if it turns counter-clockwise.
     columns = np.nonzero(arrow)[1] - arrow.shape[1] / 2
     assert side * columns.mean() > 1
@@ -54,8 +51,7 @@ def test_arrow_of_a_positive_torque_turns_counter_clockwise(
 def test_every_torque_has_a_bar_and_the_highest_is_the_greedy_one(
     pages: dict[str, str], player: Player
 ) -> None:
-    player.open(pages["swingup"])
-    player.press(Keys.SPACE)
+    player.open_paused(pages["swingup"])
     player.run("pendulum.reset(2, 1)")
     state = player.state()
     picture = player.picture("bars")
@@ -76,13 +72,10 @@ def test_every_torque_has_a_bar_and_the_highest_is_the_greedy_one(
     )
 
 
-def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(
-    pages: dict[str, str], player: Player
-) -> None:
-    player.open(pages["small"])
+def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(user: Player) -> None:
 
     def floor(lowest: float, before: float | None = None) -> float:
-        return float(player.run("return steadyFloor(arguments[0], arguments[1])", lowest, before))
+        return float(user.run("return steadyFloor(arguments[0], arguments[1])", lowest, before))
 
     assert floor(-3.4) == -5
     assert floor(-5) == -5
@@ -98,8 +91,7 @@ def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(
 def test_axis_of_the_bars_moves_a_few_times_in_an_episode(
     name: str, pages: dict[str, str], player: Player
 ) -> None:
-    player.open(pages[name])
-    player.press(Keys.SPACE)
+    player.open_paused(pages[name])
     moves = player.run(
         "const {view, episode} = pendulum.page; let [moves, before] = [0, null];"
         "pendulum.reset(2.5, 0);"
@@ -110,3 +102,65 @@ def test_axis_of_the_bars_moves_a_few_times_in_an_episode(
         "return moves"
     )
     assert 1 <= moves <= 20  # an axis from the lowest to the highest value moved in 50 steps
+
+
+def test_map_shows_the_greedy_torque_of_every_state(files: dict[str, Path], user: Player) -> None:
+    network = kp.load_weights(files["small"])
+    policy, grid = greedy_policy(network), TorqueGrid(network.action_count)
+    wait_for(lambda: user.run("return pendulum.page.map.ready"))
+    size = user.run("return pendulum.page.map.size")
+    theta, thetadot = np.meshgrid(np.linspace(-np.pi, np.pi, size), np.linspace(8, -8, size))
+    observations = np.stack([np.cos(theta), np.sin(theta), thetadot], axis=-1).astype(np.float32)
+    q = policy.q_values(observations.reshape(-1, 3))
+    found = np.array(user.run("return Array.from(pendulum.page.map.torques)"))
+    taken = q[np.arange(len(q)), [grid.nearest_index(torque) for torque in found]]
+    assert (q.max(axis=1) - taken).max() < TIE
+    assert len(set(found.tolist())) > 3  # a uniform map would prove nothing
+
+    colours, ends = user.run(
+        "const {colours} = pendulum.page.view;"
+        "return [[-2, 0, 2].map(colours.ofTorque), [colours.minus, colours.none, colours.plus]]"
+    )
+    assert colours == [list(bytes.fromhex(end[1:])) for end in ends]  # the colours of the legend
+
+    user.run("pendulum.reset(Math.PI, 8)")  # moves the path away from the tested points
+    picture = user.picture("portrait")[..., :3]
+    # The margins of the plot in the picture.
+    left, right, top, bottom = 46, picture.shape[1] - 10, 8, picture.shape[0] - 40
+    for row, column in ((10, 10), (10, 80), (48, 30), (70, 60), (90, 20), (90, 90)):
+        pixel = (
+            round(top + row / (size - 1) * (bottom - top)),
+            round(left + column / (size - 1) * (right - left)),
+        )
+        torque = found.reshape(size, size)[row, column]
+        expected = user.run("return pendulum.page.view.colours.ofTorque(arguments[0])", torque)
+        row, column = pixel  # beside the lines of the hatching
+        assert expected in picture[row, column - 2 : column + 3].tolist()
+
+
+def test_clockwise_torques_are_hatched(user: Player) -> None:
+    colours = user.run(
+        "const count = (torque) => {"
+        "  const map = {size: 97, torques: new Float32Array(97 * 97).fill(torque)};"
+        "  const picture = mapPicture(map, pendulum.page.view.colours, 200, 100);"
+        "  const {data} = picture.getContext('2d').getImageData(0, 0, 200, 100);"
+        "  return new Set(new Uint32Array(data.buffer)).size;"
+        "};"
+        "return [-2, -0.1, 0, 2].map(count)"
+    )
+    assert min(colours[:2]) > 1 == max(colours[2:])
+
+
+def test_path_passes_every_state_and_leaves_the_map_only_at_the_edge(user: Player) -> None:
+    user.run("pendulum.reset(2.6, 4)")
+    user.press("l", "s" * 12)
+    path = np.array(user.run("return pendulum.page.episode.path"))
+    assert path[0, 0] < np.pi < path[-1, 0]
+    drawn = pixels_of(user, "portrait", "path")
+    height, width = drawn.shape
+    columns = 46 + ((path[:, 0] + np.pi) % (2 * np.pi) / (2 * np.pi)) * (width - 56)
+    rows = 8 + (1 - path[:, 1] / 8) / 2 * (height - 48)
+    for row, column in np.rint([rows, columns]).T.astype(int):
+        assert drawn[row - 2 : row + 3, column - 2 : column + 3].any()
+    # A line from one edge of the picture to the other would cross the middle.
+    assert not drawn[:, round(46 + (width - 56) / 2)].any()

@@ -9,23 +9,21 @@ import numpy as np
 import pytest
 from browser import SCREENS, WEB, Player
 from conftest import wait_for
-from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.common.by import By
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player: Player) -> None:
-    colour = {"color-scheme": theme}
-    player.set_screen(360, 740, **colour)
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
+def test_page_fits_every_screen_width(pages: dict[str, str], player: Player) -> None:
+    player.set_screen(360, 740)
+    player.open_paused(pages["small"])
     player.run("pendulum.reset(3, -8); pendulum.page.episode.return = -1234.56")
     player.run("for (let i = 0; i < 200; i++) pendulum.step()")  # a last episode of four digits
     player.press("t")
     wait_for(lambda: player.text("score").startswith("Score: network −"))
     for width, height in ((320, 568), (360, 740), (390, 844), (600, 900), (844, 390), (960, 600)):
-        player.set_screen(width, height, **colour)
-        overhang = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-        assert player.run(f"return [innerWidth, {overhang}]") == [width, 0]
+        player.set_screen(width, height)
+        root = player.driver.find_element(By.TAG_NAME, "html")
+        assert player.run("return innerWidth") == width
+        assert root.get_property("scrollWidth") == root.get_property("clientWidth")
         cut = player.run(
             "return [...document.querySelectorAll('main *')].filter(e =>"
             "  e.getBoundingClientRect().right > document.documentElement.clientWidth ||"
@@ -44,19 +42,23 @@ def test_page_fits_every_screen_width(theme: str, pages: dict[str, str], player:
             ".map(c => Math.min(c.clientWidth, c.clientHeight))"
         )
         assert min(canvases) >= 120
-    player.set_screen(360, 740, **colour)
+    player.set_screen(360, 740)
     widths = (
         "return [...document.querySelectorAll('canvas')].filter(c => c.offsetParent)"
         ".map(c => c.width / c.clientWidth)"
     )
     wait_for(lambda: set(player.run(widths)) == {2})  # as sharp as the screen
-    dark = player.run("return getComputedStyle(document.body).backgroundColor") == "rgb(15, 19, 25)"
-    assert dark == (theme == "dark")
+
+
+def test_page_is_light_or_dark_as_the_system(user: Player) -> None:
+    for theme, colour in (("dark", "rgb(15, 19, 25)"), ("light", "rgb(243, 245, 248)")):
+        user.set_screen(1280, 800, **{"color-scheme": theme})
+        found = user.run("return getComputedStyle(document.body).backgroundColor")
+        assert found == colour
 
 
 def test_widest_readings_do_not_touch(duel: str, player: Player) -> None:
-    player.open(duel)
-    player.press(Keys.SPACE)
+    player.open_paused(duel)
     # Each new part of the map would write the readings anew.
     player.run("pendulum.page.map.work(60000); pendulum.page.changeMap()")
     widest = {"torque": "−2.0", "reward": "−16.27", "return": "−1848.8", "step": "200/200"}
@@ -80,11 +82,10 @@ def test_widest_readings_do_not_touch(duel: str, player: Player) -> None:
             assert top != next_top or left - right >= 8, (width, text, next_text)
 
 
-def test_keys_of_buttons_are_in_one_line(pages: dict[str, str], player: Player) -> None:
-    player.open(pages["reference"])
+def test_keys_of_buttons_are_in_one_line(user: Player) -> None:
     for width in (960, 1024, 1152, 1280, 1600):
-        player.set_screen(width, 700)
-        heights = player.run(
+        user.set_screen(width, 700)
+        heights = user.run(
             "return [...document.querySelectorAll('.row button')].map(e => e.clientHeight)"
         )
         assert max(heights) < 40, width
@@ -102,8 +103,7 @@ FIRST_SCREEN = {
 def test_first_screen_shows_what_belongs_together(
     page: str, pages: dict[str, str], duel: str, player: Player
 ) -> None:
-    player.open(duel if page == "two" else pages["reference"])
-    player.press(Keys.SPACE)
+    player.open_paused(duel if page == "two" else pages["small"])
     player.run("pendulum.reset(2, 0); for (let i = 0; i < 200; i++) pendulum.step()")
     for (width, height), visible in FIRST_SCREEN.items():
         player.set_screen(width, height)
@@ -119,22 +119,12 @@ def test_first_screen_shows_what_belongs_together(
             )
             assert top >= 0 and bottom <= height and wide > 0, (width, selector)
         if width == 1280:
-            end, bottom = player.run(
-                "return [document.documentElement.scrollHeight,"
-                "  document.querySelector('footer').getBoundingClientRect().bottom]"
-            )
-            assert end <= height  # nothing to scroll to
-            assert bottom >= height - 20  # no empty strip below the words
-            assert circle_of(player, "pendulum") >= 210
-
-
-def circle_of(player: Player, canvas: str) -> float:
-    """Returns the diameter of the circle that the end of a pendulum can reach, in px."""
-    size = player.run(
-        "const c = document.getElementById(arguments[0]); return [c.clientWidth, c.clientHeight]",
-        canvas,
-    )
-    return min(float(size[0]) - 28, float(size[1]) - 56)  # less the margins of swing.js
+            # Nothing to scroll to, and no empty strip below the words.
+            assert player.run("return document.documentElement.scrollHeight") <= height
+            assert player.boxes("footer")[0]["bottom"] >= height - 20
+            (canvas,) = player.boxes("#pendulum")
+            # The circle of the end of a pendulum, less the margins of swing.js.
+            assert min(canvas["width"] - 28, canvas["height"] - 56) >= 210
 
 
 def test_light_and_dark_theme_have_enough_contrast() -> None:

@@ -21,8 +21,7 @@ def test_dragging_turns_the_pendulum_and_starts_an_episode_there(
     width: int, height: int, pages: dict[str, str], player: Player
 ) -> None:
     player.set_screen(width, height)
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
+    player.open_paused(pages["small"])
     player.run("pendulum.reset(3, 0); pendulum.step()")
     player.run("document.getElementById('pendulum').scrollIntoView({block: 'center'})")
     canvas = player.find("pendulum")
@@ -40,33 +39,30 @@ def test_dragging_turns_the_pendulum_and_starts_an_episode_there(
     assert player.state()["steps"] == 1
 
 
-def test_a_flick_pushes_the_pendulum(pages: dict[str, str], player: Player) -> None:
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
-    x, y = middle_of(player, "pendulum")
+def test_a_flick_pushes_the_pendulum(user: Player) -> None:
+    x, y = middle_of(user, "pendulum")
     now = time.time()
-    player.mouse("mousePressed", (x, y - 60), now)
-    player.mouse("mouseMoved", (x - 20, y - 57), now + 0.03)
-    player.mouse("mouseReleased", (x - 20, y - 57), now + 0.03)
-    wait_for(lambda: not player.run("return pendulum.page.held"))
-    assert 0 < player.state()["thetadot"] <= 8
+    user.mouse("mousePressed", (x, y - 60), now)
+    user.mouse("mouseMoved", (x - 20, y - 57), now + 0.03)
+    user.mouse("mouseReleased", (x - 20, y - 57), now + 0.03)
+    wait_for(lambda: not user.run("return pendulum.page.held"))
+    assert 0 < user.state()["thetadot"] <= 8
     speed = (
         "const t = new Touch(() => {}); t.moves = arguments[0]; return t.flickSpeed(arguments[1])"
     )
-    assert player.run(speed, [[1, 0], [1.05, 0.1]], 1.06) == pytest.approx(2)
-    assert player.run(speed, [[1, 0], [1.05, -1]], 1.06) == -8  # the speed limit
-    assert player.run(speed, [[1, 0], [1.05, 0.1]], 2) == 0  # held still before the release
+    assert user.run(speed, [[1, 0], [1.05, 0.1]], 1.06) == pytest.approx(2)
+    assert user.run(speed, [[1, 0], [1.05, -1]], 1.06) == -8  # the speed limit
+    assert user.run(speed, [[1, 0], [1.05, 0.1]], 2) == 0  # held still before the release
 
 
-@pytest.mark.parametrize("finger", ["mouse", "touch"])
-@pytest.mark.parametrize("places", [[0.75], [0.5, 0.75]], ids=["press", "drag"])
+@pytest.mark.parametrize(("width", "height"), SCREENS)
 def test_a_press_and_a_drag_on_the_portrait_choose_the_state(
-    places: list[float], finger: str, duel: str, player: Player
+    width: int, height: int, duel: str, player: Player
 ) -> None:
-    player.open(duel)
-    player.press(Keys.SPACE)
-    for width, height in SCREENS:
-        player.set_screen(width, height)
+    finger = "mouse" if width == 1280 else "touch"
+    player.open_paused(duel)
+    player.set_screen(width, height)
+    for places in ([0.75], [0.5, 0.75]):
         from_middle = player.run(
             "const c = document.getElementById('portrait'); c.scrollIntoView({block: 'center'});"
             "const {width, height} = c.getBoundingClientRect();"
@@ -94,13 +90,9 @@ def test_a_press_and_a_drag_on_the_portrait_choose_the_state(
 
 def middle_of(player: Player, id: str) -> tuple[float, float]:
     """Scrolls an element into view and returns its middle on the screen."""
-    place = player.run(
-        "const e = document.getElementById(arguments[0]); e.scrollIntoView({block: 'center'});"
-        "const r = e.getBoundingClientRect();"
-        "return [r.left + r.width / 2, r.top + r.height / 2]",
-        id,
-    )
-    return place[0], place[1]
+    player.run("arguments[0].scrollIntoView({block: 'center'})", player.find(id))
+    (box,) = player.boxes(f"#{id}")
+    return box["left"] + box["width"] / 2, box["top"] + box["height"] / 2
 
 
 @pytest.fixture
@@ -117,8 +109,7 @@ def test_a_finger_turns_and_flicks_the_pendulum(
 ) -> None:
     player = fingers
     player.set_screen(width, height)
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
+    player.open_paused(pages["small"])
     x, y = middle_of(player, "pendulum")
     scrolled = player.run("return scrollY")
     now = time.time()
@@ -142,28 +133,24 @@ def test_a_finger_turns_and_flicks_the_pendulum(
     assert 2 < player.state()["thetadot"] <= 8
 
 
-def test_arrows_on_the_focused_portrait_choose_any_state(
-    pages: dict[str, str], player: Player
-) -> None:
-    player.open(pages["small"])
-    player.press(Keys.SPACE)
-    player.run("pendulum.reset(0.52, 0); document.getElementById('portrait').focus()")
-    player.press(Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_UP)
-    state = player.state()
+def test_arrows_on_the_focused_portrait_choose_any_state(user: Player) -> None:
+    user.run("pendulum.reset(0.52, 0); document.getElementById('portrait').focus()")
+    user.press(Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_UP)
+    state = user.state()
     assert [state["theta"], state["thetadot"]] == pytest.approx([0.6, 1.0])
-    assert player.text("status") == "Held at 0.60 rad, 1.00 rad/s. Enter lets go."
+    assert user.text("status") == "Held at 0.60 rad, 1.00 rad/s. Enter lets go."
     assert not state["youDrive"]
-    fine = ActionChains(player.driver, duration=0)
+    fine = ActionChains(user.driver, duration=0)
     fine.key_down(Keys.SHIFT).send_keys(Keys.ARROW_LEFT, Keys.ARROW_DOWN).key_up(Keys.SHIFT)
     fine.perform()
-    player.press(Keys.ENTER)
-    assert not player.run("return pendulum.page.held")
-    state = player.state()
+    user.press(Keys.ENTER)
+    assert not user.run("return pendulum.page.held")
+    state = user.state()
     assert [state["theta"], state["thetadot"], state["steps"]] == pytest.approx([0.59, 0.9, 0])
-    player.press(*[Keys.ARROW_LEFT] * 40, *[Keys.ARROW_DOWN] * 20)
-    state = player.state()
+    user.press(*[Keys.ARROW_LEFT] * 40, *[Keys.ARROW_DOWN] * 20)
+    state = user.state()
     assert state["theta"] == pytest.approx(0.6 - 40 * 0.1 + 2 * np.pi, abs=0.11)  # once around
     assert state["thetadot"] == -8
-    player.press(Keys.TAB)  # leaving the portrait lets go too
-    assert not player.run("return pendulum.page.held")
-    assert player.text("status") == "Paused. The network drives."
+    user.press(Keys.TAB)  # leaving the portrait lets go too
+    assert not user.run("return pendulum.page.held")
+    assert user.text("status") == "Paused. The network drives."
