@@ -111,16 +111,8 @@ def a_torque(network: kp.DQN) -> Callable[[NDArray[np.float32]], Any]:
     return lambda observation: policy(observation)[0]
 
 
-def an_array(network: kp.DQN) -> Callable[[NDArray[np.float32]], Any]:
-    return kp.load_policy(network)
-
-
 def q_in_numpy(network: kp.DQN) -> Any:
     return kp.q_function(kp.load_policy(network).q_values, GRID)
-
-
-def q_in_tensorflow(network: kp.DQN) -> Any:
-    return kp.q_function(tf.function(lambda x: network(x)), list(GRID))
 
 
 def q_in_torch_with_gradients(network: kp.DQN) -> Any:
@@ -136,14 +128,12 @@ KINDS: dict[str, Callable[[kp.DQN], Any]] = {
     ),
     "subclassed": subclassed,
     "NumPy": q_in_numpy,
-    "TensorFlow": q_in_tensorflow,
+    "TensorFlow": lambda network: kp.q_function(tf.function(lambda x: network(x)), list(GRID)),
     "PyTorch": lambda network: kp.q_function(torch_module(network)),
     "PyTorch with gradients": q_in_torch_with_gradients,
     "predict, indices": Predicts,
     "predict, torque": PredictsTorque,
     "torque": a_torque,
-    "torque in an array": an_array,
-    "Policy": as_policy,
 }
 
 
@@ -153,6 +143,7 @@ def test_every_kind_of_agent_has_the_returns_of_the_network(kind: str, network: 
     agent = as_policy(source)
     own = as_policy(network)
     np.testing.assert_array_equal(agent.act(OBSERVATIONS), own.act(OBSERVATIONS))
+    assert agent.has_q_values == ("torque" not in kind)
     if agent.has_q_values:
         np.testing.assert_allclose(
             agent.q_values(OBSERVATIONS), own.q_values(OBSERVATIONS), atol=1e-5
@@ -187,14 +178,6 @@ def test_keras_file_with_other_layers_is_read_by_keras(tmp_path: Path) -> None:
     model.save(tmp_path / "mine.h5")
     with pytest.raises(kp.WeightsError, match=r"save other models as \.keras$"):
         as_policy(tmp_path / "mine.h5")
-
-
-class Touch:
-    """A function that creates the file `touched`; Keras would have to unpickle or run it."""
-
-    def __call__(self, x: Any) -> Any:
-        Path("touched").touch()
-        return x
 
 
 def test_code_in_a_keras_file_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,18 +232,10 @@ def test_known_discount_is_that_of_the_run_or_of_stable_baselines3(network: kp.D
         assert RunInfo.from_record({"config": config}).discount is None
 
 
-def test_values_of_stable_baselines3s_dqn_are_known(network: kp.DQN) -> None:
-    agent = as_policy(Predicts(network))
-    assert agent.has_q_values
-    expected = kp.load_policy(network).q_values(OBSERVATIONS)
-    np.testing.assert_allclose(agent.q_values(OBSERVATIONS), expected, atol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("torques", "problem"),
     [
         ([-2, 0, 2], "torques has 3 numbers; the agent has 5 actions"),
-        ([-2, -1, 0, 1, 2.5], "expected numbers from -2 to 2"),
         ([-2, -1, 0, 1, np.nan], "expected numbers from -2 to 2"),
         ([[0, 0, 0, 0, 0]], "expected a list of numbers"),
         ([1, [2, 3]], "expected a list of numbers"),
@@ -314,14 +289,12 @@ def answering(answer: Any) -> Policy:
     ("answer", "problem"),
     [
         (float("nan"), "the torque nan N·m; expected a number from -2 to 2"),
-        (np.array([np.inf]), "the torque inf N·m"),
         (-2.001, "the torque -2.001 N·m"),
         (np.zeros(2), r"an array of the shape \[2\]; expected a torque in N·m"),
         (np.zeros((1, 1)), r"an array of the shape \[1, 1\]"),
         ("left", "a str of the type <U4"),
         (None, "a NoneType of the type object"),
         (True, "a bool of the type bool"),
-        (1j, "a complex of the type complex128"),
         ([[1], [2, 3]], "a list; expected a torque in N·m"),
     ],
 )

@@ -23,14 +23,15 @@ def asked(batches: list[tuple[int, ...]]) -> Any:
         batches.append(observations.shape)
         return policy.q_values(observations)
 
-    return kp.q_function(values)
+    agent = kp.q_function(values)  # which asks once
+    batches.clear()
+    return agent
 
 
 def test_many_episodes_are_made_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(evaluation, "_SIDE_BY_SIDE", 3)
     batches: list[tuple[int, ...]] = []
     agent = asked(batches)
-    batches.clear()
     score = kp.evaluate_policy(agent, 7, seed=5)
     assert batches == [(3, 3)] * 400 + [(1, 3)] * 200
     expected = kp.evaluate_policy(NETWORK, 7, seed=5)
@@ -40,7 +41,6 @@ def test_many_episodes_are_made_side_by_side(monkeypatch: pytest.MonkeyPatch) ->
 def test_watched_episodes_are_made_one_by_one() -> None:
     batches: list[tuple[int, ...]] = []
     agent = asked(batches)
-    batches.clear()
     steps: list[Any] = []
     score = kp.evaluate_policy(agent, 2, on_step=steps.append)
     assert batches == [(1, 3)] * 400

@@ -6,14 +6,13 @@ import argparse
 import io
 import math
 import shutil
-import stat
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
@@ -29,18 +28,12 @@ TITLES = ("swingup, g = 10 m/s²", "start: hanging")
 SCENE = np.full((500, 500, 3), 255, np.uint8)
 
 
-@pytest.mark.parametrize(
-    ("text", "angle"),
-    [("hanging", 180), ("upright", 0), ("90", 90), ("-12.5", -12.5), ("-180", -180)],
-)
-def test_start_is_a_name_or_an_angle(text: str, angle: float) -> None:
-    assert film_command.parse_start(text) == angle
-
-
-@pytest.mark.parametrize("text", ["", "down", "nan", "inf", "180.1", "1 2"])
-def test_other_starts_are_refused(text: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match="expected hanging, upright, or an angle"):
-        film_command.parse_start(text)
+def test_start_is_a_name_or_an_angle() -> None:
+    angles = {"hanging": 180, "upright": 0, "90": 90, "-12.5": -12.5, "-180": -180}
+    assert {text: film_command.parse_start(text) for text in angles} == angles
+    for text in ("", "down", "nan", "inf", "180.1", "1 2"):
+        with pytest.raises(argparse.ArgumentTypeError, match="expected hanging, upright, or an"):
+            film_command.parse_start(text)
 
 
 @pytest.mark.parametrize("angle", [180.0, 0.0, 90.0, -12.5])
@@ -112,23 +105,14 @@ def test_film_shows_each_step_with_the_return_of_the_evaluation(
     assert shown == list(range(0, 201, 2))
 
 
-@pytest.mark.parametrize(
-    ("angle", "title"),
-    [(180.0, "start: hanging"), (0.0, "start: upright"), (-12.5, "start: -12.5°")],
-)
-def test_film_names_its_start(
-    angle: float, title: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_film_names_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
     titles: list[tuple[str, str]] = []
-
-    def film_episode(*words: Any) -> list[Image.Image]:
-        titles.append(words[2])
-        return [Image.new("RGB", (2, 2))]
-
-    monkeypatch.setattr(film, "film_episode", film_episode)
-    arguments = argparse.Namespace(gif=tmp_path / "film.gif", video=None, start=angle, seed=0)
-    film_command.make_films(arguments, kp.load_policy("swingup"), Pendulum(10.0), "swingup")
-    assert titles == [("swingup, g = 10 m/s²", title)]
+    monkeypatch.setattr(film, "film_episode", lambda *words: titles.append(words[2]) or [])
+    for angle in (180.0, 0.0, -12.5):
+        arguments = argparse.Namespace(gif=None, video=None, start=angle, seed=0)
+        film_command.make_films(arguments, kp.load_policy("swingup"), Pendulum(10.0), "swingup")
+    starts = ("start: hanging", "start: upright", "start: -12.5°")
+    assert titles == [("swingup, g = 10 m/s²", start) for start in starts]
 
 
 def test_frame_is_cropped_and_shows_the_torque() -> None:
@@ -150,8 +134,6 @@ def test_frame_is_cropped_and_shows_the_torque() -> None:
 def test_texts_of_a_frame_do_not_overlap_and_are_inside(
     torque: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from PIL import ImageDraw
-
     boxes: list[tuple[float, float, float, float]] = []
     draw_text = ImageDraw.ImageDraw.text
 
@@ -172,8 +154,6 @@ def test_texts_of_a_frame_do_not_overlap_and_are_inside(
 
 
 def test_numbers_of_a_frame_have_no_negative_zero(monkeypatch: pytest.MonkeyPatch) -> None:
-    from PIL import ImageDraw
-
     texts: list[str] = []
     monkeypatch.setattr(ImageDraw.ImageDraw, "text", lambda *words, **_: texts.append(words[2]))
     for torque in (-0.01, 0.01):
@@ -198,24 +178,19 @@ def test_video_without_ffmpeg_is_refused(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the stand-in for ffmpeg is a script")
-@pytest.mark.parametrize("works", [True, False])
-def test_ffmpeg_gets_the_pictures_and_its_failure_is_one_line(works: bool, tmp_path: Path) -> None:
-    program = tmp_path / "ffmpeg"
+def test_ffmpeg_gets_the_pictures_and_its_failure_is_one_line(tmp_path: Path) -> None:
+    program, pictures = tmp_path / "ffmpeg", [Image.new("RGB", (4, 6))] * 3
     # Writes its words and the number of its input's bytes to its last word, the film.
-    success = 'for film; do :; done; echo "$* $(wc -c)" > "$film"'
-    failure = "echo first >&2; echo second >&2; exit 1"
-    program.write_text(f"#!/bin/sh\n{success if works else failure}\n", encoding="utf-8")
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    pictures = [Image.new("RGB", (4, 6))] * 3
-    if not works:
-        with pytest.raises(kp.UserError, match=r"^ffmpeg failed: first.*second$") as caught:
-            film_command.encode_mp4(str(program), pictures, 0.05)
-        assert "\n" not in str(caught.value)
-        return
+    program.write_text('#!/bin/sh\nfor film; do :; done; echo "$* $(wc -c)" > "$film"\n')
+    program.chmod(0o755)
     words = film_command.encode_mp4(str(program), pictures, 0.05).decode().split()
     assert "4x6" in words
     assert words[words.index("-r") + 1] == "20"
     assert words[-1] == str(3 * 4 * 6 * 3)
+    program.write_text("#!/bin/sh\necho first >&2; echo second >&2; exit 1\n")
+    with pytest.raises(kp.UserError, match=r"^ffmpeg failed: first.*second$") as caught:
+        film_command.encode_mp4(str(program), pictures, 0.05)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.optimum.optimal_return import optimal_return
 from keras_pendulum.optimum.stored_results import Problem, read_returns, write
 
@@ -70,16 +69,9 @@ def test_returns_are_computed_once_and_stored_with_later_seeds(
     assert sorted(path.name for path in cache.iterdir()) == ["gravity_1.npz", "gravity_9.81.npz"]
 
 
-def test_each_number_of_steps_has_its_own_file(cache: Path, computed: list[int]) -> None:
-    long, short = (optimal_return(9.81, [3], steps)[0] for steps in (200, 60))
-    assert long - short == pytest.approx(1 / 60 - 1 / 200)
-    assert [optimal_return(9.81, [3], steps)[0] for steps in (200, 60)] == [long, short]
-    assert computed == [1000, 1000]
-    names = ["gravity_9.81.npz", "gravity_9.81_steps_60.npz"]
-    assert sorted(path.name for path in cache.iterdir()) == names
-
-
-def test_valid_cache_is_used(cache: Path, computed: list[int]) -> None:
+def test_file_without_steps_and_discount_is_one_of_200_steps(
+    cache: Path, computed: list[int]
+) -> None:
     cache.mkdir()
     (cache / "gravity_9.81.npz").write_bytes(archive())
     assert optimal_return(9.81, [4]) == [-7.0]
@@ -101,14 +93,6 @@ def test_returns_between_the_lowest_possible_one_and_0_are_plausible(
     for returns in ({0: value}, {0: -1.0, 1: value, 2: -2.0}):
         write_returns(path, problem, returns)
         assert read_returns(path, problem) == (returns if plausible else {})
-
-
-def test_bounds_of_plausible_returns_are_plausible_themselves(tmp_path: Path) -> None:
-    path, lowest, problem = tmp_path / "a.npz", 200 * Pendulum.reward_range[0], Problem.valid(1.0)
-    write_returns(path, problem, {0: lowest, 1: 0.0})
-    assert read_returns(path, problem) == {0: lowest, 1: 0.0}
-    write_returns(path, problem, {0: float(np.nextafter(lowest, -np.inf))})
-    assert read_returns(path, problem) == {}
 
 
 @pytest.mark.parametrize(
@@ -135,18 +119,13 @@ def test_file_belongs_to_one_problem(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content",
     [
-        b"",
         b"not an archive",
         archive()[:-30],
-        archive()[:100],
         archive(gravity=np.float64(9.8)),
         archive(gravity=np.array([9.81])),
-        archive(gravity=np.array("9.81")),
         archive(steps=np.int64(60)),
+        archive(steps=np.array([200])),
         archive(returns=np.full(1000, np.nan)),
-        archive(returns=np.full(1000, -np.inf)),
-        archive(returns=np.full(1000, 1.0)),
-        archive(returns=np.full(1000, -4000.0)),
         archive(returns=np.full(999, -7.0)),
         archive(returns=np.full(1000, -7.0, np.float32)),
         archive(returns=np.full(1000, -7.0, object)),
@@ -181,25 +160,6 @@ def test_nothing_in_a_cache_is_unpickled(tmp_path: Path, monkeypatch: pytest.Mon
     Path("a.npz").write_bytes(archive(returns=np.array([MakesAFile()])))
     assert read_returns(Path("a.npz"), Problem.valid(9.81)) == {}
     assert not Path("made").exists()
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        archive(),
-        archive(steps=np.int64(61)),
-        archive(steps=np.array([60])),
-        archive(steps=np.int64(60), returns=np.full(1000, -1000.0)),
-    ],
-)
-def test_cache_of_another_episode_length_is_computed_again(
-    content: bytes, cache: Path, computed: list[int]
-) -> None:
-    cache.mkdir()
-    (cache / "gravity_9.81_steps_60.npz").write_bytes(content)
-    returns = optimal_return(9.81, range(5), 60)
-    assert ((returns < -9) & (returns > -13)).all()
-    assert computed == [1000]
 
 
 def test_file_with_a_flipped_bit_never_gives_another_return(tmp_path: Path) -> None:
