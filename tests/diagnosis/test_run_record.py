@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,6 @@ from exact_agent import NOISE, diagnose_values, exact_values
 import keras_pendulum as kp
 from keras_pendulum.diagnosis.run_record import RunRecord, read_record
 from keras_pendulum.dqn.replay_buffer import Transitions
-from keras_pendulum.errors import WeightsError
 from keras_pendulum.optimum.dynamics import TORQUES
 from keras_pendulum.storage.run_folder import find_run
 
@@ -17,7 +15,8 @@ from keras_pendulum.storage.run_folder import find_run
 @pytest.fixture(scope="module")
 def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
     folder = tmp_path_factory.mktemp("run")
-    kp.train_dqn(kp.preset("reference", episodes=30, hidden_units=(8, 8)), folder)
+    config = kp.preset("reference", episodes=30, hidden_units=(8,), warmup_episodes=30)
+    kp.train_dqn(config, folder)  # without an update
     return read_record(find_run(folder))
 
 
@@ -147,9 +146,3 @@ def test_recorded_learning_rate_is_named_beside_another_fault(record: RunRecord)
     terminal = changed(large, terminated=np.ones_like(record.replay.terminated))
     names = [finding.name for finding in diagnose_values(useless, terminal).findings]
     assert names[:2] == ["no-bootstrapping", "learning-rate"]
-
-
-def test_weights_without_a_run_are_refused(tmp_path: Path) -> None:
-    kp.save_weights(kp.DQN((8,)), tmp_path / "pendulum_weight.h5")
-    with pytest.raises(WeightsError, match="without a run"):
-        read_record(find_run(tmp_path))

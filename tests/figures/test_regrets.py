@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from keras_pendulum.figures.curves import curve_style
+from keras_pendulum.figures.curves import STYLES, curve_style
 from keras_pendulum.figures.regrets import RegretRow, draw_regrets
+
+
+def test_24_curves_have_different_styles_and_neighbours_different_lines() -> None:
+    styles = [curve_style(index) for index in range(24)]
+    assert len({(color, line) for color, line, _ in styles}) == 24
+    assert len({(color, marker) for color, _, marker in styles}) == 24
+    assert styles[: len(STYLES)] == list(STYLES)
 
 
 def test_row_shows_the_regret_its_interval_and_its_runs() -> None:

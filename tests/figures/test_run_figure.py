@@ -48,8 +48,10 @@ def planes() -> dict[str, PhasePlane]:
     return {"one": network_phase_plane(kp.DQN((8,))), "two": optimal_phase_plane(1.0, 0.5)}
 
 
-@pytest.mark.parametrize("with_planes", [True, False])
-@pytest.mark.parametrize(("episodes", "every"), [(1, 0), (60, 0), (60, 10), (500, 50)])
+@pytest.mark.parametrize(
+    ("episodes", "every", "with_planes"),
+    [(1, 0, False), (60, 0, True), (60, 10, False), (500, 50, True)],
+)
 def test_no_text_of_a_run_overlaps_another_or_leaves_the_picture(
     episodes: int, every: int, with_planes: bool, planes: dict[str, PhasePlane]
 ) -> None:

@@ -110,27 +110,22 @@ def test_new_random_start_follows_the_last_step(user: Player) -> None:
     assert -1 <= min(speeds) < -0.3 < 0.3 < max(speeds) <= 1
 
 
-def test_score_stays_while_time_runs_on(user: Player) -> None:
-    user.run("pendulum.reset(1, 0); for (let i = 0; i < 198; i++) pendulum.step()")
+def test_score_has_the_network_from_your_start_and_stays_while_time_runs_on(user: Player) -> None:
+    begin = "pendulum.reset(1, 0); for (let i = 0; i < 198; i++) pendulum.step()"
+    end = "pendulum.page.step(); pendulum.page.step()"
+    user.run(begin)
     assert user.text("score") == "The score comes after 200 steps."
-    user.run("pendulum.page.step(); pendulum.page.step(); pendulum.page.running = true")
-    assert user.state()["over"]
+    user.run(end)
+    network = user.state()["return"]
+    user.press("l")
+    user.run(f"{begin}; {end}; pendulum.page.running = true")
+    you = user.state()["return"]
+    assert you < network
     score = user.text("score")
-    assert score.startswith("Score: network −")
+    assert score.startswith(f"Score: you {shown(you)} · network {shown(network)} · ")
     user.pass_time(4)
     assert not user.state()["over"]  # the next episode, after a rest
     assert user.text("score") == score
-
-
-def test_score_has_the_network_from_your_start(user: Player) -> None:
-    episode = "pendulum.reset(1, 0); for (let i = 0; i < 200; i++) pendulum.step()"
-    user.run(episode)
-    network = user.state()["return"]
-    user.press("l")
-    user.run(episode)
-    you = user.state()["return"]
-    assert you < network
-    assert user.text("score").startswith(f"Score: you {shown(you)} · network {shown(network)} · ")
 
 
 def test_tab_focuses_every_control_in_order_with_an_outline(
@@ -156,12 +151,3 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
     keys = ActionChains(player.driver, duration=0)
     keys.key_down(Keys.CONTROL).send_keys("j").key_up(Keys.CONTROL).perform()
     assert player.button(2).get_attribute("aria-pressed") == "true"  # the browser's own shortcut
-
-
-def test_page_starts_paused_for_reduced_motion(pages: dict[str, str], player: Player) -> None:
-    player.set_screen(1280, 800, **{"reduced-motion": "reduce"})
-    player.open(pages["small"])
-    assert player.text("status") == "Paused. The network drives."
-    assert player.state()["steps"] == 0
-    player.press(Keys.SPACE)
-    wait_for(lambda: player.state()["steps"] > 2)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from browser import SCREENS, WEB, Player
 from conftest import wait_for
+from matplotlib.colors import to_rgb
 from selenium.webdriver.common.by import By
 
 
@@ -144,11 +145,11 @@ def test_light_and_dark_theme_have_enough_contrast() -> None:
 
 def contrast(one: str, other: str) -> float:
     """Returns the contrast ratio of two colours, #rrggbb (WCAG 2.2)."""
-    darker, lighter = sorted(
-        float(
-            np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-            @ [0.2126, 0.7152, 0.0722]
-        )
-        for c in (np.frombuffer(bytes.fromhex(x[1:]), np.uint8) / 255 for x in (one, other))
-    )
+    darker, lighter = sorted(map(luminance, (one, other)))
     return (lighter + 0.05) / (darker + 0.05)
+
+
+def luminance(colour: str) -> float:
+    c = np.array(to_rgb(colour))
+    linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])

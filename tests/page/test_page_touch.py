@@ -16,27 +16,21 @@ from selenium.webdriver.common.actions.pointer_input import PointerInput
 from selenium.webdriver.common.keys import Keys
 
 
-@pytest.mark.parametrize(("width", "height"), SCREENS)
-def test_dragging_turns_the_pendulum_and_starts_an_episode_there(
-    width: int, height: int, pages: dict[str, str], player: Player
-) -> None:
-    player.set_screen(width, height)
-    player.open_paused(pages["small"])
-    player.run("pendulum.reset(3, 0); pendulum.step()")
-    player.run("document.getElementById('pendulum').scrollIntoView({block: 'center'})")
-    canvas = player.find("pendulum")
-    drag = ActionChains(player.driver, duration=0)
+def test_dragging_turns_the_pendulum_and_starts_an_episode_there(user: Player) -> None:
+    user.run("pendulum.reset(3, 0); pendulum.step()")
+    canvas = user.find("pendulum")
+    drag = ActionChains(user.driver, duration=0)
     drag.move_to_element_with_offset(canvas, 0, -60).click_and_hold().perform()
-    assert player.state()["theta"] == pytest.approx(0, abs=0.05)
-    assert player.run("return pendulum.page.held")
-    drag = ActionChains(player.driver, duration=0)
+    assert user.state()["theta"] == pytest.approx(0, abs=0.05)
+    assert user.run("return pendulum.page.held")
+    drag = ActionChains(user.driver, duration=0)
     drag.move_to_element_with_offset(canvas, -60, 0).pause(0.3).release().perform()
-    state = player.state()
+    state = user.state()
     assert state["theta"] == pytest.approx(np.pi / 2, abs=0.05)  # on the left is positive
     assert (state["thetadot"], state["steps"], state["return"]) == (0, 0, 0)
-    wait_for(lambda: player.text("optimum").startswith("−"))
-    player.press("s")
-    assert player.state()["steps"] == 1
+    wait_for(lambda: user.text("optimum").startswith("−"))
+    user.press("s")
+    assert user.state()["steps"] == 1
 
 
 def test_a_flick_pushes_the_pendulum(user: Player) -> None:
