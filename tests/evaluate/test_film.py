@@ -107,7 +107,12 @@ def test_film_shows_each_step_with_the_return_of_the_evaluation(
 
 def test_film_names_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
     titles: list[tuple[str, str]] = []
-    monkeypatch.setattr(film, "film_episode", lambda *words: titles.append(words[2]) or [])
+
+    def film_episode(*words: Any) -> list[Image.Image]:
+        titles.append(words[2])
+        return []
+
+    monkeypatch.setattr(film, "film_episode", film_episode)
     for angle in (180.0, 0.0, -12.5):
         arguments = argparse.Namespace(gif=None, video=None, start=angle, seed=0)
         film_command.make_films(arguments, kp.load_policy("swingup"), Pendulum(10.0), "swingup")

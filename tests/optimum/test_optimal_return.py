@@ -79,7 +79,7 @@ def test_shipped_returns_have_the_published_means(
     monkeypatch.setattr(module, "best_return", None)  # nothing is computed
     for (gravity, steps, count), (mean, tolerance) in PUBLISHED.items():
         returns = optimal_return(gravity, range(count), steps)
-        assert (returns.dtype, returns.shape) == (np.float64, (count,))
+        assert returns.dtype == np.float64 and returns.shape == (count,)
         assert returns.mean() == pytest.approx(mean, abs=tolerance)
     assert not list(tmp_path.iterdir())
 

@@ -71,8 +71,9 @@ def test_value_is_the_best_return_of_all_torque_sequences(
         return returns.max(axis=1)
 
     tables = list(itertools.islice(value_tables(gravity, 500), 4))
+    theta, speed = starts.T
     for horizon in (1, 2, 3):
-        found, expected = value_at(tables[horizon], *starts.T), best(*starts.T, horizon)
+        found, expected = value_at(tables[horizon], theta, speed), best(theta, speed, horizon)
         np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)
 
 
