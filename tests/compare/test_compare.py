@@ -95,7 +95,6 @@ def test_wrong_folders_and_files_are_one_error_line(runs: Path, refusal: Refusal
         (["text.h5"], "text.h5: a file; expected the folder of a run"),
         ([one, "--out", "text.h5"], "text.h5 holds something else than a PNG"),
         ([one, "--out", "a.jpg"], "--out is a.jpg: expected a name that ends in .png"),
-        ([one, "--out", ""], "the name is empty"),
         ([one, "--out", "no/such/folder.png"], "cannot write no/such/folder.png"),
         ([one, "--ot", "a.png"], "unrecognized arguments: --ot a.png; did you mean --out?"),
     ):

@@ -5,12 +5,11 @@ import itertools
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum import best_return as module
 from keras_pendulum.optimum.best_return import best_return
@@ -19,10 +18,6 @@ from keras_pendulum.optimum.value_iteration import greedy_return, solve, value_t
 
 Array = NDArray[np.float64]
 GRID = np.linspace(-2, 2, 41)  # N·m
-
-
-def pendulum(gravity: float) -> Any:
-    return gymnasium.make("Pendulum-v1", g=gravity, disable_env_checker=True).unwrapped
 
 
 def starts(count: int) -> Array:
@@ -102,7 +97,7 @@ def test_shipped_returns_are_at_least_those_of_a_coarse_policy(
 
 @pytest.mark.parametrize("steps", [1, 2])
 def test_best_return_equals_the_best_of_all_torque_sequences(steps: int) -> None:
-    env = pendulum(10.0)
+    env: Any = Pendulum(10.0).make_env().unwrapped
     states = starts(20)
     sequences = [[*first, 0.0] for first in itertools.product(GRID, repeat=steps - 1)]
     best = [max(gymnasium_return(env, start, torques) for torques in sequences) for start in states]
@@ -128,7 +123,8 @@ def test_search_improves_on_the_greedy_policies(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_search_tries_every_torque_in_three_steps() -> None:
-    env, start = pendulum(10.0), np.array([2.5, 1.0])
+    env: Any = Pendulum(10.0).make_env().unwrapped
+    start = np.array([2.5, 1.0])
 
     def return_without_further_torque(torques: list[float]) -> float:
         return gymnasium_return(env, start, torques + [0.0] * (20 - len(torques)))
