@@ -13,8 +13,8 @@ from conftest import Command
 import keras_pendulum as kp
 from benchmarks.files.keras_files import check_files, observations
 from benchmarks.files.keras_networks import NETWORKS, Order
-from keras_pendulum.page import __main__ as page
 
+pytestmark = pytest.mark.usefixtures("files_read_here")
 # Each kind of layer, of model and of order; `benchmarks.files.keras_files` has all networks.
 DRAWN = (
     *("two hidden layers", "tanh, relu, linear", "dense_10 before dense_2", "slashes in names"),
@@ -49,20 +49,10 @@ def test_files_load_as_the_same_network_or_are_refused_by_a_layer(
     assert check_files(name, version, keras_versions[version], tmp_path)
 
 
-@pytest.mark.parametrize("version", [2, 3])
-@pytest.mark.parametrize("suffix", ["h5", "keras"])
-def test_recorded_activations_of_each_layer_are_those_of_the_loaded_network(
-    version: int, suffix: str, keras_versions: dict[int, Any], tmp_path: Path
-) -> None:
-    model = NETWORKS["tanh, relu, linear"].model(keras_versions[version])
-    model.save(tmp_path / f"a.{suffix}")
-    loaded = kp.load_weights(tmp_path / f"a.{suffix}")
-    assert loaded.activation == "tanh,relu,linear"
-
-
 def test_network_of_mixed_activations_is_saved_and_loaded_unchanged(tmp_path: Path) -> None:
     NETWORKS["tanh, relu, linear"].model(keras).save(tmp_path / "a.keras")
     loaded = kp.load_weights(tmp_path / "a.keras")
+    assert loaded.activation == "tanh,relu,linear"
     kp.save_weights(loaded, tmp_path / "b.h5")
     again = kp.load_weights(tmp_path / "b.h5")
     inputs = observations()
@@ -70,45 +60,17 @@ def test_network_of_mixed_activations_is_saved_and_loaded_unchanged(tmp_path: Pa
     np.testing.assert_array_equal(loaded.clone()(inputs), loaded(inputs))
 
 
-@pytest.mark.parametrize(
-    ("version", "name"), [(2, "weights_alone.h5"), (2, "model.weights.h5"), (3, "model.weights.h5")]
-)
-def test_weights_alone_load_with_tanh_and_one_warning(
-    version: int, name: str, keras_versions: dict[int, Any], tmp_path: Path
-) -> None:
-    model = NETWORKS["two hidden layers"].model(keras_versions[version])
-    path = tmp_path / name
-    model.save_weights(str(path))
-    with pytest.warns(UserWarning) as caught:
-        loaded = kp.load_weights(path)
-    assert loaded.activation == "tanh"
-    (message,) = (str(warning.message) for warning in caught)
-    assert message.isprintable()  # one line
-    assert all(word in message for word in (str(path), "tanh", "activation="))
-
-
-def test_evaluate_takes_the_activation_or_warns_in_one_line(
-    command: Command, in_process: Command, tmp_path: Path
+def test_weights_alone_load_as_tanh_with_a_warning_unless_the_activation_is_given(
+    in_process: Command, tmp_path: Path
 ) -> None:
     NETWORKS["relu"].model(keras).save_weights(tmp_path / "a.weights.h5")
+    with pytest.warns(UserWarning, match=r"a\.weights\.h5 .* tanh.* activation=") as caught:
+        assert kp.load_weights(tmp_path / "a.weights.h5").activation == "tanh"
+    assert [str(each.message).isprintable() for each in caught] == [True]  # one line
     words = ("evaluate", "a.weights.h5", "--episodes", "1", "--json")
-    assumed = command(*words)
+    assumed = in_process(*words)
     assert assumed.returncode == 0
     (line,) = assumed.stderr.splitlines()
     assert all(word in line for word in ("a.weights.h5", "tanh", "--activation"))
     named = in_process(*words, "--activation", "relu")
     assert (named.returncode, named.stderr) == (0, "")
-
-
-@pytest.mark.parametrize("name", ["elu", "Add"])
-def test_page_refuses_another_network_in_one_line(
-    name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    NETWORKS[name].model(keras).save(tmp_path / "a.keras")
-    assert page.main([str(tmp_path / "a.keras")]) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    (line,) = printed.err.splitlines()
-    assert line.startswith("error: ")
-    assert "a.keras" in line
-    assert "odd" in line

@@ -19,6 +19,7 @@ from keras_pendulum.storage.snapshots import (
     take_snapshot,
 )
 
+pytestmark = pytest.mark.usefixtures("files_read_here")
 NETWORK = kp.DQN((4,), 2)
 HISTORY = [EpisodeRecord(i, -0.1 * i, -20.0 * i, 0.5, 0.1, 200 * i, i, 1.0) for i in range(3)]
 
