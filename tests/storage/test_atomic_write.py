@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -24,58 +26,41 @@ def test_file_of_another_kind_is_not_replaced(tmp_path: Path) -> None:
             require_no_other_file(tmp_path / name, b"GIF8", "a GIF")
 
 
-class Windows:
-    """A file that another program has open, as Windows shows it for some attempts."""
+@pytest.mark.parametrize(
+    ("platform", "refusals", "attempts", "message"),
+    [
+        ("win32", 40, 41, None),  # closed after 2 s
+        ("win32", 1000, 41, "another program has the file"),
+        ("linux", 1000, 1, "Permission denied"),
+    ],
+)
+def test_file_that_another_program_has_open_is_replaced_within_2_seconds_on_windows(
+    platform: str,
+    refusals: int,
+    attempts: int,
+    message: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"old")
+    targets: list[Path] = []
+    slept: list[float] = []
+    really_replace = os.replace
 
-    platform = "win32"
-
-    def __init__(self, refusals: int, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.attempts = 0
-        self.slept = 0.0
-        self._refusals = refusals
-        self._replace = os.replace
-        monkeypatch.setattr(atomic_write, "sys", self)
-        monkeypatch.setattr(os, "replace", self.replace)
-        monkeypatch.setattr(time, "sleep", self.sleep)
-
-    def replace(self, source: Path, target: Path) -> None:
-        self.attempts += 1
-        if self.attempts <= self._refusals:
+    def replace(source: Path, target: Path) -> None:
+        targets.append(target)
+        if len(targets) <= refusals:
             raise PermissionError(errno.EACCES, "Permission denied")
-        self._replace(source, target)
+        really_replace(source, target)
 
-    def sleep(self, seconds: float) -> None:
-        self.slept += seconds
-
-
-def test_file_that_windows_has_open_is_replaced_when_it_is_closed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "a.csv").write_bytes(b"old")
-    windows = Windows(refusals=40, monkeypatch=monkeypatch)
-    write_atomically(tmp_path / "a.csv", b"new")
-    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == {"a.csv": b"new"}
-    assert windows.attempts == 41
-    assert windows.slept == pytest.approx(2.0)
-
-
-def test_file_that_stays_open_on_windows_is_one_line_after_2_seconds(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "a.csv").write_bytes(b"old")
-    windows = Windows(refusals=1000, monkeypatch=monkeypatch)
-    with pytest.raises(kp.UserError, match=r"cannot write .*a\.csv: another program has the file"):
-        write_atomically(tmp_path / "a.csv", b"new")
-    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == {"a.csv": b"old"}
-    assert windows.slept == pytest.approx(2.0)
-
-
-def test_refused_replacement_is_final_on_other_systems(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    windows = Windows(refusals=1000, monkeypatch=monkeypatch)
-    windows.platform = "linux"
-    with pytest.raises(kp.UserError, match=r"cannot write .*a\.csv: Permission denied"):
-        write_atomically(tmp_path / "a.csv", b"new")
-    assert (windows.attempts, windows.slept) == (1, 0.0)
-    assert not list(tmp_path.iterdir())
+    monkeypatch.setattr(atomic_write, "sys", SimpleNamespace(platform=platform))
+    monkeypatch.setattr(os, "replace", replace)
+    monkeypatch.setattr(time, "sleep", slept.append)
+    error = pytest.raises(kp.UserError, match=rf"cannot write .*a\.csv: {message}")
+    with error if message else contextlib.nullcontext():
+        write_atomically(path, b"new")
+    assert targets == [path] * attempts
+    assert sum(slept) == pytest.approx(0.05 * (attempts - 1))
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == (b"old" if message else b"new")
