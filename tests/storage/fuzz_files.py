@@ -90,41 +90,28 @@ def damage(sound: Path, damaged: Path, seed: str) -> None:
 
 
 Failures = list[tuple[str, Outcome]]
+Loads = list[tuple[str, str, Outcome]]  # name of the file, `_kind`, outcome
 
 
-class Sums:
-    """The sums of the outcomes of several loads."""
-
-    def __init__(self, file: str) -> None:
-        self._file = file
-        self._outcomes: Counter[str] = Counter()
-        self._seconds = self._memory = self._child_memory = 0.0
-        self.failures: Failures = []
-
-    def add(self, name: str, path: Path, outcome: Outcome, expected: str) -> None:
-        """Counts a load of the file `path`, of which a sound copy loads as `expected`."""
-        kind = _kind(outcome, expected, path)
-        self._outcomes[kind] += 1
-        if kind in ("failed", "crashed", "endless"):
-            self.failures.append((name, outcome))
-        self._seconds = max(self._seconds, outcome.seconds)
-        self._memory = max(self._memory, outcome.memory)
-        self._child_memory = max(self._child_memory, outcome.child_memory)
-
-    def row(self) -> Row:
-        return {
-            "file": self._file,
-            "files": self._outcomes.total(),
-            "refused": self._outcomes["refused"],
-            "loaded, equal": self._outcomes["equal"],
-            "loaded, other": self._outcomes["other"],
-            "failed": self._outcomes["failed"],
-            "crashed": self._outcomes["crashed"],
-            "over 10 s": self._outcomes["endless"],
-            "slowest, ms": round(self._seconds * 1e3),
-            "memory, MB": round(self._memory, 1),
-            "memory of the child, MB": round(self._child_memory, 1),
-        }
+def summary(file: str, loads: Loads) -> tuple[Row, Failures]:
+    """Returns a row of sums, and the loads that failed, crashed or took too long."""
+    kinds = Counter(kind for _, kind, _ in loads)
+    outcomes = [outcome for _, _, outcome in loads]
+    row = {
+        "file": file,
+        "files": len(loads),
+        "refused": kinds["refused"],
+        "loaded, equal": kinds["equal"],
+        "loaded, other": kinds["other"],
+        "failed": kinds["failed"],
+        "crashed": kinds["crashed"],
+        "over 10 s": kinds["endless"],
+        "slowest, ms": round(max(outcome.seconds for outcome in outcomes) * 1e3),
+        "memory, MB": round(max(0.0, *(outcome.memory for outcome in outcomes)), 1),
+        "memory of the child, MB": round(max(0.0, *(each.child_memory for each in outcomes)), 1),
+    }
+    failed = ("failed", "crashed", "endless")
+    return row, [(name, outcome) for name, kind, outcome in loads if kind in failed]
 
 
 def _kind(outcome: Outcome, expected: str, path: Path) -> str:
@@ -137,21 +124,18 @@ def _kind(outcome: Outcome, expected: str, path: Path) -> str:
 
 
 def fuzz(layout: str, count: int, loader: Loader, folder: Path) -> tuple[Row, Failures]:
-    """Loads `count` damaged files of a layout.
-
-    Returns a row of sums, and the failures: the seed and the outcome of each load that crashed,
-    took too long, or raised another error than one line of WeightsError.
-    """
+    """Loads `count` damaged files of a layout; returns their `summary`, which names the seeds."""
     suffix = ".keras" if layout == "keras" else ".h5"
     sound = write_sound(folder / f"sound{suffix}", layout)
     damaged = folder / f"damaged{suffix}"
-    sums = Sums(f"damaged at random, {layout}")
     expected = loader.load(sound).text
+    loads: Loads = []
     for i in range(count):
         name = f"0 {layout} {i}"
         damage(sound, damaged, name)
-        sums.add(name, damaged, loader.load(damaged), expected)
-    return sums.row(), sums.failures
+        outcome = loader.load(damaged)
+        loads.append((name, _kind(outcome, expected, damaged), outcome))
+    return summary(f"damaged at random, {layout}", loads)
 
 
 def measure_hostile_files(loader: Loader, folder: Path) -> Iterator[tuple[Row, Failures]]:
@@ -165,9 +149,10 @@ def measure_hostile_files(loader: Loader, folder: Path) -> Iterator[tuple[Row, F
     }
     expected = {layout: loader.load(path).text for layout, path in sound.items()}
     for kind, layouts in kinds.items():
-        sums = Sums(kind)
+        loads: Loads = []
         for layout in layouts:
             path = write(kind, layout, folder)
-            sums.add(f"{kind}, {layout}", path, loader.load(path), expected[layout])
+            outcome = loader.load(path)
+            loads.append((f"{kind}, {layout}", _kind(outcome, expected[layout], path), outcome))
             path.unlink()
-        yield sums.row(), sums.failures
+        yield summary(kind, loads)

@@ -92,6 +92,21 @@ def kernel(make: Callable[[h5py.File, str, Any], None]) -> Change:
     return opened(change)
 
 
+def dataset(*arguments: Any, **options: Any) -> Change:
+    """Returns a change that puts another array in place of a kernel."""
+    return kernel(lambda file, name, array: file.create_dataset(name, *arguments, **options))
+
+
+def in_place(value: Any) -> Change:
+    """Returns a change that puts a link or a type in place of a kernel."""
+    return kernel(lambda file, name, array: file.__setitem__(name, value))
+
+
+def beside(name: str, value: Any) -> Change:
+    """Returns a change that adds a link or a type."""
+    return opened(lambda file, _: file.__setitem__(name, value))
+
+
 def virtual(file: h5py.File, name: str, array: Any) -> None:
     layout = h5py.VirtualLayout(array.shape, np.float32)
     layout[:] = h5py.VirtualSource("elsewhere.h5", "data", array.shape)
@@ -152,53 +167,35 @@ def sparse_array(file: h5py.File, name: str) -> None:
 
 
 BY_H5PY: dict[str, Change] = {
-    "a soft link": kernel(lambda file, name, array: file.__setitem__(name, h5py.SoftLink("/"))),
+    "a soft link": in_place(h5py.SoftLink("/")),
     "a link to itself": kernel(
         lambda file, name, array: file.__setitem__(name, h5py.SoftLink("/" + name))
     ),
-    "an external link": kernel(
-        lambda file, name, array: file.__setitem__(name, h5py.ExternalLink("other.h5", "/x"))
-    ),
-    "a link beside the layers": opened(
-        lambda file, name: file.__setitem__("aside", h5py.SoftLink("/nowhere"))
-    ),
+    "an external link": in_place(h5py.ExternalLink("other.h5", "/x")),
+    "a link beside the layers": beside("aside", h5py.SoftLink("/nowhere")),
     "data in another file": kernel(
         lambda file, name, array: file.create_dataset(
             name, array.shape, "f4", external=[("/etc/passwd", 0, array.nbytes)]
         )
     ),
     "a virtual array": kernel(virtual),
-    "a compressed array of 1 GiB": kernel(
-        lambda file, name, array: file.create_dataset(
-            name, (2**14, 2**14), "f4", chunks=(2**11, 2**11), compression="gzip"
-        )
+    "a compressed array of 1 GiB": dataset(
+        (2**14, 2**14), "f4", chunks=(2**11, 2**11), compression="gzip"
     ),
     "an array in chunks": kernel(
         lambda file, name, array: file.create_dataset(name, data=array, chunks=array.shape)
     ),
-    "an array of 1 GiB that is not stored": kernel(
-        lambda file, name, array: file.create_dataset(name, (2**14, 2**14), "f4")
-    ),
-    "strings": kernel(
-        lambda file, name, array: file.create_dataset(
-            name, data=["a"] * 4, dtype=h5py.string_dtype()
-        )
-    ),
+    "an array of 1 GiB that is not stored": dataset((2**14, 2**14), "f4"),
+    "strings": dataset(data=["a"] * 4, dtype=h5py.string_dtype()),
     "references": kernel(
         lambda file, name, array: file.create_dataset(
             name, data=[file.ref] * 4, dtype=h5py.ref_dtype
         )
     ),
-    "a compound": kernel(
-        lambda file, name, array: file.create_dataset(
-            name, data=np.zeros(4, [("a", "f4"), ("b", "f4")])
-        )
-    ),
+    "a compound": dataset(data=np.zeros(4, [("a", "f4"), ("b", "f4")])),
     "a group in place of an array": kernel(lambda file, name, array: file.create_group(name)),
-    "a type in place of an array": kernel(
-        lambda file, name, array: file.__setitem__(name, np.dtype("f4"))
-    ),
-    "a type beside the layers": opened(lambda file, name: file.__setitem__("type", np.dtype("f4"))),
+    "a type in place of an array": in_place(np.dtype("f4")),
+    "a type beside the layers": beside("type", np.dtype("f4")),
     "one array by 900 names": opened(same_array_again_and_again),
     "a group in itself": opened(circle),
     "40 nested groups": opened(
