@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import preset
-from keras_pendulum.dqn import losses as keras_losses
-from keras_pendulum.dqn.network import DQN
 from keras_pendulum.dqn.replay_buffer import Transitions
-from keras_pendulum.train.run import make_optimizer, make_run
+from keras_pendulum.train.run import make_run
 
 torch.set_num_threads(1)  # the order of a sum, and so its rounding, depends on the threads
 
@@ -72,23 +70,23 @@ def recorded_weights(recorded: Recorded, when: str) -> Weights:
     [
         (preset("original", seed=1), 0.0),
         (preset("reference", seed=1), 0.1),
-        # Period 7, so that the 10 updates between comparisons end at every phase of it; 48
-        # episodes make 210 updates, so that the cosine nearly reaches 0 within the 200.
-        (preset(target_update="hard", target_period=7, episodes=48, seed=1), 0.1),
-        (preset(double_q=True, tau=0.01, seed=1), 0.1),
+        # Period 7, so that the 10 updates between comparisons end at every phase of it; 44
+        # episodes make 120 updates, so that the cosine comes near 0 within the 100.
+        (preset(target_update="hard", target_period=7, episodes=44, seed=1), 0.1),
+        (preset(double_q=True, tau=0.01, loss="huber", seed=1), 0.1),
     ],
     ids=["original", "reference", "hard target", "double"],
 )
-def test_200_updates_give_the_same_losses_and_weights(
+def test_100_updates_give_the_same_losses_and_weights(
     config: Config, terminated_share: float, recorded_transitions: Transitions
 ) -> None:
     random = np.random.default_rng(1)
-    steps = random.integers(len(recorded_transitions.action), size=(20, 10, 32))
+    steps = random.integers(len(recorded_transitions.action), size=(10, 10, 32))
     # The pendulum never terminates, so random transitions are marked as terminated.
     terminated = random.random(steps.shape) < terminated_share
     agent = make_run(config).agent
     twin = twin_agent(config, agent.online.get_weights())
-    for call in range(20):
+    for call in range(10):
         batches = take(recorded_transitions, steps[call])  # [10, 32, ...]
         batches = batches._replace(terminated=terminated[call])
         losses, twin_losses = agent.update(batches), twin.update(to_torch(batches))
@@ -117,58 +115,3 @@ def test_torch_repeats_the_updates_of_the_recorded_run(
     # With the ε of PyTorch's Adam they are 6.9e-4 in the first 20 losses and 0.026.
     np.testing.assert_allclose(losses, recorded["loss"], rtol=0, atol=2.5e-5)
     assert largest_difference(weights, recorded_weights(recorded, "final")) < 5e-5
-
-
-def test_keras_weights_in_torch_give_the_same_q_values(recorded: Recorded) -> None:
-    weights = recorded_weights(recorded, "final")
-    observations = recorded["probe_observations"]  # [64, 3]
-    network = DQN()
-    network.set_weights(weights)
-    with torch.no_grad():
-        q_values = torch_agent.from_keras(weights)(torch.from_numpy(observations)).numpy()
-    np.testing.assert_allclose(q_values, network(observations), rtol=0, atol=1e-5)
-    np.testing.assert_allclose(q_values, recorded["probe_q_values"], rtol=0, atol=1e-5)
-
-
-def test_weights_are_the_same_after_the_way_to_torch_and_back(recorded: Recorded) -> None:
-    weights = recorded_weights(recorded, "final")
-    converted = torch_agent.to_keras(torch_agent.from_keras(weights))
-    for actual, expected in zip(converted, weights, strict=True):
-        assert actual.dtype == expected.dtype
-        np.testing.assert_array_equal(actual, expected)
-
-
-def test_targets_and_losses_agree_with_torch_on_random_input() -> None:
-    random = np.random.default_rng(0)
-    q, next_q, next_q_online = random.normal(-20, 10, (3, 256, 41)).astype(np.float32)
-    reward = random.uniform(-16, 0, 256).astype(np.float32)
-    action = random.integers(41, size=256, dtype=np.int32)
-    terminated = random.random(256) < 0.25
-    outcome = (reward, terminated, next_q)
-    twin_reward, twin_terminated, twin_next_q = map(torch.from_numpy, outcome)
-    target = keras_losses.td_target(*outcome, 0.9)
-    twin_target = torch_agent.td_target(twin_reward, twin_terminated, twin_next_q, 0.9)
-    np.testing.assert_allclose(twin_target, target, rtol=1e-6)
-    double_target = keras_losses.double_td_target(*outcome, next_q_online, 0.9)
-    twin_double_target = torch_agent.double_td_target(
-        twin_reward, twin_terminated, twin_next_q, torch.from_numpy(next_q_online), 0.9
-    )
-    np.testing.assert_allclose(twin_double_target, double_target, rtol=1e-6)
-    near_q = q.copy()  # half of the TD errors within 1, where the Huber loss is a square
-    near_q[np.arange(128), action[:128]] = target.numpy()[:128] + random.uniform(-1, 1, 128)
-    for values in (q, near_q):
-        batch = (values, action, target.numpy())
-        for name in ("mean_squared_error", "huber"):
-            twin_loss = getattr(torch_agent, name)(*map(torch.from_numpy, batch))
-            loss = getattr(keras_losses, name)(*batch)
-            np.testing.assert_allclose(twin_loss, loss, rtol=1e-6)
-
-
-def test_cosine_rate_is_that_of_the_keras_optimizer() -> None:
-    config = preset(hidden_units=(4,), episodes=44)
-    optimizer: Any = make_optimizer(config)
-    optimizer.build(DQN((4,)).trainable_variables)
-    rate = torch_agent.cosine_rate(config.learning_rate, config.total_updates)
-    for steps in (0, 1, 30, 45, 89, 90, 91, 200):  # 90 is the last
-        optimizer.iterations.assign(steps)
-        assert float(optimizer.learning_rate) == pytest.approx(rate(steps), abs=1e-9)
