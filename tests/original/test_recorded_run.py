@@ -112,7 +112,7 @@ def test_original_repeats_its_first_100_episodes(recorded: Recorded) -> None:
 
 @strict_where_tried
 def test_walkthrough_repeats_its_first_100_episodes() -> None:
-    recorded = load_recording("walkthrough_run_seed1")
+    recorded = dict(load_recording("walkthrough_run_seed1"))
     run = run_from(recorded, "walkthrough", episodes=STRICT_EPISODES)
     actions = record_actions(run)
 
