@@ -11,8 +11,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.errors import ConfigError
-from keras_pendulum.figures.curves import STYLES
-from keras_pendulum.study.arms import default_arms, describe_setting, own_arms
+from keras_pendulum.study.arms import default_arms, describe_setting, own_arms, study_name
 
 
 def test_default_study_goes_from_original_to_reference_one_change_at_a_time() -> None:
@@ -37,10 +36,6 @@ def test_default_study_leaves_each_change_out_of_reference() -> None:
     assert all(arm.baseline == "reference" for arm in left_out)
     assert len({arm.training_config for arm in arms}) == len(arms) - 1
     assert len({arm.slug for arm in arms}) == len(arms)
-
-
-def test_each_curve_of_the_default_study_has_its_own_colour() -> None:
-    assert len([arm for arm in default_arms() if arm.has_curve]) <= len(STYLES)
 
 
 def test_arms_that_differ_only_in_their_preset_share_their_runs() -> None:
@@ -80,6 +75,17 @@ def test_own_arm_is_a_preset_with_settings() -> None:
 def test_name_of_an_arm_in_file_names_is_allowed_on_windows(name: str, slug: str) -> None:
     (arm,) = own_arms([], [f"{name}: original"])
     assert (arm.name, arm.slug) == (name.strip(), slug)
+
+
+def test_folder_of_a_study_has_the_names_of_its_arms_and_at_most_150_letters() -> None:
+    def name_of(*names: str) -> str:
+        return study_name(own_arms([], [f"{name}: reference" for name in names]))
+
+    assert name_of("a" * 64) == "a" * 22  # the paths of its results have the arm's name twice
+    assert name_of("a" * 37, "b" * 35) == f"{'a' * 37}-vs-{'b' * 35}"  # 76 letters
+    assert name_of("a" * 37, "b" * 36) == f"{'a' * 37}-vs-{'b' * 35}"  # one letter is cut
+    # A name that ends with a dot is another one on Windows.
+    assert name_of("a" * 37, f"{'b' * 34}.5") == f"{'a' * 37}-vs-{'b' * 34}"
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -20,6 +19,7 @@ from typing import Any
 import psutil
 import pytest
 from conftest import TESTS, environment_restored, running_module, wait_for
+from distributed import LocalCluster
 
 from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
@@ -49,12 +49,16 @@ def describe_worker(job: Job) -> Reply:
     return Reply(os.environ["OMP_NUM_THREADS"].encode(), 0, 0, 0, str(os.getpid()))
 
 
-def kill_worker_of_seed_0(attempts: Path, failures: int, job: Job) -> Reply:
-    if job.config.seed == 0:
-        with open(attempts, "a", encoding="utf-8") as file:
-            file.write("x")
-        if len(attempts.read_text(encoding="utf-8")) <= failures:
-            psutil.Process().kill()
+FAILURES = {0: 99, 1: 1}  # killed workers by seed
+
+
+def kill_worker(folder: Path, job: Job) -> Reply:
+    """Kills the worker in the first attempts of some seeds; counts the attempts in files."""
+    attempts = folder / str(job.config.seed)
+    with open(attempts, "a", encoding="utf-8") as file:
+        file.write("x")
+    if len(attempts.read_text(encoding="utf-8")) <= FAILURES.get(job.config.seed, 0):
+        psutil.Process().kill()
     return describe_worker(job)
 
 
@@ -64,20 +68,18 @@ def never_end(started: Path, job: Job) -> Reply:
         time.sleep(1)
 
 
-@pytest.mark.parametrize("failures", [1, 99])
 def test_job_of_a_killed_worker_is_repeated_up_to_three_times_and_no_other_job(
-    failures: int, tmp_path: Path
+    tmp_path: Path,
 ) -> None:
-    work = partial(kill_worker_of_seed_0, tmp_path / "attempts", failures)
     lines: list[str] = []
     with local_workers(1) as client:
+        work = partial(kill_worker, tmp_path)
         finished = list(run_all(client, work, map(make_job, range(3)), lines.append))
     problems = {each.job.config.seed: each.problem for each in finished}
-    assert problems == {0: "" if failures == 1 else "it lost its worker 3 times", 1: "", 2: ""}
-    assert len((tmp_path / "attempts").read_text()) == (2 if failures == 1 else 3)
-    assert len(lines) == min(failures, 3)
-    for line in lines:
-        assert re.fullmatch(r"lost the worker tcp://127.0.0.1:\d+, interrupting arm, seed 0", line)
+    assert problems == {0: "it lost its worker 3 times", 1: "", 2: ""}
+    assert [len((tmp_path / str(seed)).read_text()) for seed in range(3)] == [3, 2, 1]
+    lost = r"lost the worker tcp://127.0.0.1:\d+, interrupting arm, seed (\d)"
+    assert sorted(re.sub(lost, r"\1", line) for line in lines) == ["0", "0", "0", "1"]
 
 
 def listening_sockets() -> set[tuple[str, int]]:
@@ -141,9 +143,22 @@ def running_scheduler(folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], s
         yield process, json.loads(file.read_text())["address"]
 
 
-def running_worker(address: str, threads: int = 1) -> AbstractContextManager[object]:
-    words = [address, "--no-nanny", "--nthreads", str(threads)]
-    return running("distributed.cli.dask_worker", *words)
+def running_worker(address: str) -> AbstractContextManager[object]:
+    return running("distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1")
+
+
+@contextmanager
+def cluster_of_this_process(workers: int = 1, threads: int = 1) -> Iterator[str]:
+    """Yields the address of a scheduler whose workers are threads of this process."""
+    with LocalCluster(
+        n_workers=workers,
+        threads_per_worker=threads,
+        processes=False,
+        protocol="tcp://",
+        host="127.0.0.1",
+        dashboard_address=None,
+    ) as cluster:
+        yield cluster.scheduler_address
 
 
 def refusal(address: str, versions: dict[str, str]) -> str:
@@ -153,24 +168,22 @@ def refusal(address: str, versions: dict[str, str]) -> str:
     return str(caught.value)
 
 
-def test_unsuitable_cluster_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unsuitable_cluster_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     versions = installed_versions()
-    with running_scheduler(tmp_path) as (_, address):
-        with monkeypatch.context() as impatient:
-            impatient.setattr(dask_workers, "_FIRST_WORKER_SECONDS", 0.1)
-            message = refusal(address, versions)
-        assert message == (
+    with cluster_of_this_process(workers=0) as address, monkeypatch.context() as impatient:
+        impatient.setattr(dask_workers, "_FIRST_WORKER_SECONDS", 0.1)
+        assert refusal(address, versions) == (
             f"the scheduler at {address} has no worker: start some with "
             f"`dask worker {address} --nthreads 1 --nworkers N`"
         )
-        with running_worker(address, threads=2):
-            assert "has 2 threads: start workers with --nthreads 1" in refusal(address, versions)
-        with running_worker(address):
-            other = {**versions, "numpy": "1.0"}
-            assert "the scheduler has numpy 2" in refusal(address, other)
-            # Also where only the workers differ.
-            monkeypatch.setattr("distributed.Client.run_on_scheduler", lambda self, function: other)
-            assert "the worker tcp://127.0.0.1:" in refusal(address, other)
+    with cluster_of_this_process(threads=2) as address:
+        assert "has 2 threads: start workers with --nthreads 1" in refusal(address, versions)
+    with cluster_of_this_process() as address:
+        other = {**versions, "numpy": "1.0"}
+        assert "the scheduler has numpy 2" in refusal(address, other)
+        # Also where only the workers differ.
+        monkeypatch.setattr("distributed.Client.run_on_scheduler", lambda self, function: other)
+        assert "the worker tcp://127.0.0.1:" in refusal(address, other)
 
 
 def test_scheduler_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,24 +192,52 @@ def test_scheduler_that_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPat
         assert refusal(address, {}).startswith(f"no scheduler answers at {address}: start one")
 
 
-@pytest.mark.parametrize("end", [subprocess.Popen.kill, subprocess.Popen.terminate])
-def test_lost_scheduler_is_noticed_while_no_job_finishes(
+@pytest.mark.parametrize(
+    ("moment", "end"),
+    [
+        ("before the first run", subprocess.Popen.kill),
+        ("during a run", subprocess.Popen.kill),
+        ("during a run", subprocess.Popen.terminate),
+        ("after the last run", subprocess.Popen.kill),
+    ],
+)
+def test_lost_scheduler_is_one_error(
+    moment: str,
     end: Callable[[subprocess.Popen[bytes]], None],
     tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    work = partial(never_end, tmp_path / "started")
+    check = dask_workers._require_same_versions
     lines: list[str] = []
     with running_scheduler(tmp_path) as (scheduler, address), running_worker(address):
 
-        def stop_scheduler() -> None:
+        def stop_scheduler(client: Any) -> None:
+            client._timeout = 0  # of the attempts to connect again
+            end(scheduler)
+            scheduler.wait()
+
+        def stop_during_a_run() -> None:
             wait_for((tmp_path / "started").exists)
             end(scheduler)
 
-        with cluster_workers(address, installed_versions()) as client:
-            Thread(target=stop_scheduler).start()
-            with pytest.raises(UserError) as caught:
+        def check_versions(client: Any, versions: dict[str, str]) -> None:
+            if moment == "before the first run":
+                stop_scheduler(client)
+            check(client, versions)
+
+        monkeypatch.setattr(dask_workers, "_require_same_versions", check_versions)
+        with (
+            pytest.raises(UserError) as caught,
+            cluster_workers(address, installed_versions()) as client,
+        ):
+            if moment == "during a run":
+                Thread(target=stop_during_a_run).start()
+                work = partial(never_end, tmp_path / "started")
                 list(run_all(client, work, [make_job(0)], lines.append))
+            assert len(list(run_all(client, describe_worker, [make_job(0)]))) == 1
+            stop_scheduler(client)
+            client.nthreads()
     assert str(caught.value) == (
         f"the scheduler at {address} is gone: start one and run the command again; it continues "
         "with the remaining runs"
@@ -205,45 +246,13 @@ def test_lost_scheduler_is_noticed_while_no_job_finishes(
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("moment", ["before the first run", "after the last run"])
-def test_scheduler_lost_while_no_job_runs_is_one_error(
-    moment: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    check = dask_workers._require_same_versions
-    with running_scheduler(tmp_path) as (scheduler, address), running_worker(address):
-
-        def stop_scheduler(client: Any) -> None:
-            client._timeout = 0  # of the attempts to connect again
-            scheduler.kill()
-            scheduler.wait()
-
-        def check_without_scheduler(client: Any, versions: dict[str, str]) -> None:
-            stop_scheduler(client)
-            check(client, versions)
-
-        if moment == "before the first run":
-            monkeypatch.setattr(dask_workers, "_require_same_versions", check_without_scheduler)
-        with (
-            pytest.raises(UserError) as caught,
-            cluster_workers(address, installed_versions()) as client,
-        ):
-            assert len(list(run_all(client, describe_worker, [make_job(0)]))) == 1
-            stop_scheduler(client)
-            client.nthreads()
-    assert str(caught.value) == str(lost_scheduler(address))
-    assert capfd.readouterr() == ("", "")
-
-
 def test_lost_scheduler_is_reported_by_a_client_that_still_runs_and_fails_at_its_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def fail(*arguments: object, **named: object) -> None:
         raise RuntimeError
 
-    with running_scheduler(tmp_path) as (_, address), running_worker(address):
+    with cluster_of_this_process() as address:
         with (
             pytest.raises(UserError) as caught,
             cluster_workers(address, installed_versions()) as client,
@@ -257,36 +266,10 @@ def test_lost_scheduler_is_reported_by_a_client_that_still_runs_and_fails_at_its
     assert str(caught.value) == str(lost_scheduler(address))
 
 
-def test_other_error_is_not_reported_as_a_lost_scheduler(tmp_path: Path) -> None:
+def test_other_error_is_not_reported_as_a_lost_scheduler() -> None:
     with (
-        running_scheduler(tmp_path) as (_, address),
-        running_worker(address),
+        cluster_of_this_process() as address,
         pytest.raises(ZeroDivisionError),
         cluster_workers(address, installed_versions()) as client,
     ):
         client.run(lambda: 1 / 0)
-
-
-# A test that is killed while it has a process.
-KILLED = """
-import sys, time
-from conftest import running_module
-
-with running_module("http.server", "--bind", "127.0.0.1", "0") as process:
-    print(process.pid, flush=True)
-    time.sleep(600)
-"""
-
-
-def test_killed_test_leaves_no_process_behind() -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", KILLED],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([*IMPORTED_FROM, *sys.path])},
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as killed:
-        assert killed.stdout is not None
-        child = int(killed.stdout.readline())
-        assert psutil.pid_exists(child)
-        killed.kill()
-        killed.communicate()  # ends when the child, which has inherited the output, has ended

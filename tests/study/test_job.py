@@ -10,6 +10,7 @@ import pytest
 
 from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
+from keras_pendulum.evaluate.evaluation import evaluate_policy
 from keras_pendulum.study import job as job_module
 from keras_pendulum.study.job import (
     Job,
@@ -126,7 +127,7 @@ def test_result_has_the_settings_of_the_learning_only() -> None:
     assert settings.keys() == PENDULUM.config.learning().keys() - {"seed"}
 
 
-def test_run_has_a_greedy_regret_for_each_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_is_that_of_train_dqn_with_its_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(job_module, "use_one_thread", lambda: None)
     monkeypatch.setattr(job_module, "_EVALUATIONS", 2)
     job = Job("arm", "arm", preset("original", hidden_units=(8,), episodes=5), installed_versions())
@@ -135,6 +136,9 @@ def test_run_has_a_greedy_regret_for_each_evaluation(monkeypatch: pytest.MonkeyP
     assert result is not None
     trained = train_dqn(preset("original", hidden_units=(8,), episodes=5, evaluate_every=3))
     assert result.greedy_regrets == [round(trained.history[2].greedy_regret, 6)]
+    assert result.returns == evaluate_policy(trained.network).returns.tolist()
+    returns = [record.episode_return for record in trained.history]
+    assert result.episode_returns == curve_points(returns)
     assert reply.evaluation > 0
     assert reply.training > 0
 

@@ -36,6 +36,13 @@ def reply(job: Job) -> Reply:
     return Reply(encode(job, result), 1.0, 2.0, 4.0, "host:7")
 
 
+def fill(folder: ResultsFolder) -> None:
+    """Makes the folder of a study with all results."""
+    with folder.create_and_lock():
+        for job in folder.jobs():
+            folder.save(job, reply(job))
+
+
 def result_files(folder: Path) -> list[Path]:
     return sorted((folder / "results").glob("*/*.json"))
 
@@ -79,9 +86,7 @@ def test_log_that_windows_has_open_gets_its_line_when_it_is_closed(
     monkeypatch.setattr(atomic_write, "time", SimpleNamespace(sleep=lambda seconds: None))
     monkeypatch.setattr(results_folder, "open", open_closed, raising=False)
     folder = ResultsFolder(tmp_path / "study", own_arms(["reference"], []), 1)
-    with folder.create_and_lock():
-        (job,) = folder.jobs()
-        folder.save(job, reply(job))
+    fill(folder)
     assert refusals == []
     lines = (folder.path / "seconds.csv").read_bytes().splitlines()
     assert lines[1:] == [b"reference,0,host:7,1.000,2.000,4.000"]
@@ -89,22 +94,19 @@ def test_log_that_windows_has_open_gets_its_line_when_it_is_closed(
 
 def test_results_of_other_versions_are_missing(tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path / "study", own_arms(["reference"], []), 2)
-    with folder.create_and_lock():
-        for job in folder.jobs():
-            folder.save(job, reply(job))
+    fill(folder)
     assert folder.missing_jobs() == []
     folder.versions = {**folder.versions, "keras": "2.0"}
     assert len(folder.missing_jobs()) == 2
 
 
-def folder_without_manifest(path: Path, seeds: int = 2) -> ResultsFolder:
-    """Returns a folder with all results of a study, whose `study.json` is lost."""
-    folder = ResultsFolder(path, own_arms(["reference", "cartpole"], []), seeds)
-    with folder.create_and_lock():
-        for job in folder.jobs():
-            folder.save(job, reply(job))
+BOTH = ["reference", "cartpole"]
+
+
+def fill_without_manifest(path: Path) -> None:
+    """Makes a folder with all results of a study, whose `study.json` is lost."""
+    fill(ResultsFolder(path, own_arms(BOTH, []), 2))
     (path / "study.json").unlink()
-    return folder
 
 
 def test_folder_of_an_older_version_with_settings_that_have_no_effect_is_used(
@@ -127,34 +129,33 @@ def test_folder_of_an_older_version_with_settings_that_have_no_effect_is_used(
 
 @pytest.mark.parametrize("seeds", [1, 2, 3])
 def test_results_without_manifest_are_used_by_the_same_study(seeds: int, tmp_path: Path) -> None:
-    folder_without_manifest(tmp_path)
-    folder = ResultsFolder(tmp_path, own_arms(["reference", "cartpole"], []), seeds)
+    fill_without_manifest(tmp_path)
+    folder = ResultsFolder(tmp_path, own_arms(BOTH, []), seeds)
     folder.require_usable()
     with folder.create_and_lock():
         assert len(folder.missing_jobs()) == 2 * max(0, seeds - 2)
     assert (tmp_path / "study.json").exists()
 
 
-@pytest.mark.parametrize("change", ["other arms", "other settings", "damage", "other name"])
+@pytest.mark.parametrize(
+    ("presets", "arms", "change", "first"),
+    [
+        (["reference"], [], "", "cartpole/cartpole-seed0.json"),
+        (["cartpole"], ["reference: reference tau=0.5"], "", "reference/reference-seed0.json"),
+        (BOTH, [], "damage", "cartpole/cartpole-seed0.json"),
+        (BOTH, [], "name", "reference/reference-seed01.json"),
+    ],
+)
 def test_results_without_manifest_are_refused_by_name_in_another_study(
-    change: str, tmp_path: Path
+    presets: list[str], arms: list[str], change: str, first: str, tmp_path: Path
 ) -> None:
-    folder_without_manifest(tmp_path)
-    own = [["reference", "cartpole"], []]
-    first = "cartpole/cartpole-seed0.json"
-    if change == "other arms":
-        own = [["reference"], []]
-    elif change == "other settings":
-        own = [["cartpole"], ["reference: reference tau=0.5"]]
-        first = "reference/reference-seed0.json"
-    elif change == "damage":
-        file = tmp_path / "results" / first
+    fill_without_manifest(tmp_path)
+    file = tmp_path / "results" / first
+    if change == "damage":
         file.write_bytes(file.read_bytes()[:-9])
-    else:
-        first = "reference/reference-seed01.json"
-        file = tmp_path / "results" / first
+    elif change == "name":
         file.with_name("reference-seed1.json").rename(file)
-    folder = ResultsFolder(tmp_path, own_arms(*own), 2)
+    folder = ResultsFolder(tmp_path, own_arms(presets, arms), 2)
     before = {file: file.read_bytes() for file in tmp_path.rglob("*.*")}
     with pytest.raises(UserError) as caught, folder.create_and_lock():
         pass
@@ -165,12 +166,10 @@ def test_results_without_manifest_are_refused_by_name_in_another_study(
 
 
 def test_folder_in_use_is_refused(tmp_path: Path) -> None:
-    first, second = (
-        ResultsFolder(tmp_path / "study", own_arms(["reference"], []), 2) for _ in range(2)
-    )
+    first, second = (ResultsFolder(tmp_path, own_arms(["reference"], []), 2) for _ in range(2))
     with (
         first.create_and_lock(),
-        pytest.raises(UserError, match="study"),
+        pytest.raises(UserError, match="another run is writing"),
         second.create_and_lock(),
     ):
         pass

@@ -6,18 +6,19 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 from distributed import Client, LocalCluster
+from test_results_folder import reply
 
 from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.study import __main__ as study_command
 from keras_pendulum.study import dask_workers
 from keras_pendulum.study import job as job_module
-from keras_pendulum.study.job import Job, Reply, RunResult, curve_points, encode
+from keras_pendulum.study.job import Job, Reply
 from keras_pendulum.study.runner import run_all
 
 
@@ -34,13 +35,6 @@ def client() -> Iterator[Client]:
 
 def make_job(seed: int) -> Job:
     return Job("arm", "arm", preset("reference", seed=seed), {})
-
-
-def reply(job: Job) -> Reply:
-    """Returns a reply without training."""
-    points = len(curve_points([0.0] * job.config.episodes))
-    result = RunResult(0.0, [-1.5] * 100, [-0.1] * points, [-1.5] * points, [1.5] * 10)
-    return Reply(encode(job, result), 1.0, 2.0, 4.0, "host:7")
 
 
 def flaky_work(
@@ -112,104 +106,105 @@ def test_each_worker_has_one_job_at_a_time(client: Client) -> None:
     assert len(list(runs)) == 49
 
 
-def use_workers_of(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Makes the command `study` use the worker of this process."""
-
-    @contextmanager
-    def local_workers(count: int) -> Iterator[Client]:
-        yield client
-
-    monkeypatch.setattr(dask_workers, "local_workers", local_workers)
+Study = Callable[..., tuple[int, str, str]]
 
 
-def test_failed_runs_are_reported_and_the_next_study_retries_them(
+@pytest.fixture
+def study(
     client: Client,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-) -> None:
+) -> Study:
+    """Runs the command `study` with the worker of this process; returns its status and output."""
+    monkeypatch.setattr(dask_workers, "local_workers", lambda count: nullcontext(client))
+
+    def run(
+        *words: str, out: Path = tmp_path / "study", work: Callable[[Job], Reply] = reply
+    ) -> tuple[int, str, str]:
+        monkeypatch.setattr(job_module, "train_and_score", work)
+        status = study_command.main([*words, "--out", str(out)])
+        printed = capsys.readouterr()
+        return status, printed.out, printed.err
+
+    return run
+
+
+def test_failed_runs_are_reported_and_the_next_study_retries_them(study: Study) -> None:
     def diverge(job: Job) -> Reply:
         if (job.arm, job.config.seed) == ("starved", 0):
             raise UserError("the loss is nan")
         return reply(job)
 
-    use_workers_of(client, monkeypatch)
-    monkeypatch.setattr(job_module, "train_and_score", diverge)
     words = ["--arm", "small: reference", "--arm", "starved: original", "--seeds", "2"]
-    words += ["--out", str(tmp_path / "study")]
-    assert study_command.main(words) == 1
-    printed = capsys.readouterr()
-    assert printed.err == (
+    status, out, err = study(*words, work=diverge)
+    assert (status, err) == (
+        1,
         "starved, seed 0: failed, the loss is nan\n"
         "error: 1 of 4 runs failed (starved, seed 0: the loss is nan); run the same command again "
-        "to retry them\n"
+        "to retry them\n",
     )
-    assert re.findall(r"^(.*): regret 1\.50, 4\.0 s, (\d/\d)", printed.out, re.M) == [
+    assert re.findall(r"^(.*): regret 16\.27, 4\.0 s, (\d/\d)", out, re.M) == [
         ("small, seed 0", "1/4"),
         ("small, seed 1", "2/4"),
         ("starved, seed 1", "3/4"),
     ]
+    status, out, err = study(*words)
+    assert (status, err) == (0, "")
+    assert out.startswith("3 of 4 runs are already finished\nstarved, seed 0: regret 16.27, ")
+    assert ", 4/4, 0:00 left\n" in out
 
-    monkeypatch.setattr(job_module, "train_and_score", reply)
-    assert study_command.main(words) == 0
-    printed = capsys.readouterr()
-    assert printed.err == ""
-    assert printed.out.startswith(
-        "3 of 4 runs are already finished\nstarved, seed 0: regret 1.50, "
-    )
-    assert ", 4/4, 0:00 left\n" in printed.out
+
+def test_study_prints_the_reasons_of_at_most_5_failures(study: Study) -> None:
+    def fail(job: Job) -> Reply:
+        raise UserError("no memory")
+
+    status, _, err = study("--presets", "reference", "--seeds", "6", work=fail)
+    assert status == 1
+    reasons = "; ".join(f"reference, seed {seed}: no memory" for seed in range(5))
+    last = err.splitlines()[-1]
+    assert last.startswith(f"error: 6 of 6 runs failed ({reasons}; and 1 more); run")
 
 
 @pytest.mark.parametrize("obstacle", ["the folder", "its results"])
 def test_study_whose_folder_cannot_be_made_ends_before_its_first_run(
-    obstacle: str,
-    client: Client,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    obstacle: str, study: Study, tmp_path: Path
 ) -> None:
-    use_workers_of(client, monkeypatch)
-    monkeypatch.setattr(job_module, "train_and_score", reply)
-    (tmp_path / "file").touch()
-    folder = tmp_path / ("file/study" if obstacle == "the folder" else "study")
-    words = ["--presets", "reference", "--seeds", "1", "--out", str(folder)]
+    words = ["--presets", "reference", "--seeds", "1"]
+    folder = tmp_path / "study"
     if obstacle == "its results":
-        assert study_command.main(words) == 0
+        assert study(*words)[0] == 0
         shutil.rmtree(folder / "results")
         (folder / "results").touch()
-        capsys.readouterr()
+    else:
+        (tmp_path / "file").touch()
+        folder = tmp_path / "file" / "study"
     runs: list[Job] = []
-    monkeypatch.setattr(job_module, "train_and_score", runs.append)
-    assert study_command.main(words) == 2
-    printed = capsys.readouterr()
-    assert re.fullmatch(r"error: cannot .*study.*: .*\n", printed.err)
-    assert (printed.out, runs) == ("", [])
+    status, out, err = study(*words, out=folder, work=runs.append)
+    assert (status, out, runs) == (2, "", [])
+    assert re.fullmatch(r"error: cannot .*study.*: .*\n", err)
 
 
-def test_lost_manifest_is_written_again_and_an_edited_result_is_made_again(
-    client: Client,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+def test_lost_manifest_is_written_again_and_a_changed_result_is_made_again(
+    study: Study, tmp_path: Path
 ) -> None:
-    use_workers_of(client, monkeypatch)
-    monkeypatch.setattr(job_module, "train_and_score", reply)
-    folder = tmp_path / "study"
-    words = ["--presets", "reference", "--seeds", "2", "--out", str(folder)]
-    assert study_command.main(words) == 0
-    manifest = (folder / "study.json").read_bytes()
-    (folder / "study.json").unlink()
-    capsys.readouterr()
-    assert study_command.main(words) == 0
-    assert capsys.readouterr().out.startswith("2 of 2 runs are already finished\n\n")
-    assert (folder / "study.json").read_bytes() == manifest
+    words = ["--presets", "reference", "--seeds", "2"]
+    assert study(*words)[0] == 0
+    manifest = tmp_path / "study" / "study.json"
+    before = manifest.read_bytes()
+    manifest.unlink()
+    status, out, _ = study(*words)
+    assert status == 0
+    assert out.startswith("2 of 2 runs are already finished\n\n")
+    assert manifest.read_bytes() == before
 
-    edited = folder / "results" / "reference" / "reference-seed1.json"
-    before = edited.read_bytes()
+    result = tmp_path / "study" / "results" / "reference" / "reference-seed1.json"
+    before = result.read_bytes()
     content = json.loads(before)["result"]
-    edited.write_bytes(job_module._with_checksum({**content, "returns": []}))
-    assert study_command.main(words) == 0
-    printed = capsys.readouterr()
-    assert printed.err == f"{edited} is damaged or was changed: its run is made again\n"
-    assert printed.out.startswith("1 of 2 runs are already finished\nreference, seed 1: ")
-    assert edited.read_bytes() == before
+    for changed in (job_module._with_checksum({**content, "returns": []}), before[:100]):
+        result.write_bytes(changed)
+        status, out, err = study(*words)
+        assert status == 0
+        assert err == f"{result} is damaged or was changed: its run is made again\n"
+        assert out.startswith("1 of 2 runs are already finished\nreference, seed 1: ")
+        assert result.read_bytes() == before
