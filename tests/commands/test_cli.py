@@ -8,10 +8,15 @@ import shutil
 import subprocess
 import sys
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from keras_pendulum import cli
+
+
+def run(code: str, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code], text=True, check=False, **options)
 
 
 def test_closed_pipe_ends_a_command_without_a_message() -> None:
@@ -24,14 +29,7 @@ def test_closed_pipe_ends_a_command_without_a_message() -> None:
     environment = {k: value for k, value in os.environ.items() if k != "PYTHONUNBUFFERED"}
     reader, writer = os.pipe()
     os.close(reader)
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=environment,
-        stdout=writer,
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
+    done = run(code, env=environment, stdout=writer, stderr=subprocess.PIPE)
     os.close(writer)
     assert (done.returncode, done.stderr) == (1, "")
 
@@ -49,26 +47,26 @@ def test_closed_pipe_of_windows_ends_a_command_without_a_message(
     assert capfd.readouterr().err == ""
 
 
+# Prints to both outputs.
+COMMAND = """
+import sys, warnings
+from keras_pendulum import cli
+from keras_pendulum.errors import UserError
+
+def command():
+    print('θ = ±1, g = 1 m/s² …')
+    warnings.warn('ε ≤ γ')
+    raise UserError('“δ”')
+
+cli.OneLineParser().parse_args([])
+sys.exit(cli.run_command(command))
+"""
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
 def test_messages_are_printed_in_any_code_page(encoding: str) -> None:
-    code = (
-        "import sys, warnings\n"
-        "from keras_pendulum import cli\n"
-        "from keras_pendulum.errors import UserError\n"
-        "def command():\n"
-        "    print('θ = ±1, g = 1 m/s² …')\n"
-        "    warnings.warn('ε ≤ γ')\n"
-        "    raise UserError('“δ”')\n"
-        "cli.OneLineParser().parse_args([])\n"
-        "sys.exit(cli.run_command(command))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONIOENCODING": encoding},
-        capture_output=True,
-        encoding=encoding,
-        check=False,
-    )
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = run(COMMAND, env=environment, capture_output=True, encoding=encoding)
     assert done.returncode == 2
     assert "1, g = 1 m/s" in done.stdout
     assert [line.split(":")[0] for line in done.stderr.splitlines()] == ["warning", "error"]
@@ -76,21 +74,12 @@ def test_messages_are_printed_in_any_code_page(encoding: str) -> None:
 
 @pytest.mark.parametrize("closed", ["stdout", "stderr"])
 def test_closed_output_is_no_error_and_nothing_goes_to_the_other(closed: str) -> None:
-    code = (
-        "import sys\n"
-        "from keras_pendulum import cli\n"
-        "from keras_pendulum.errors import UserError\n"
-        f"sys.{closed} = None\n"
-        "def command():\n"
-        "    print('to stdout')\n"
-        "    raise UserError('to stderr')\n"
-        "cli.OneLineParser().parse_args([])\n"
-        "sys.exit(cli.run_command(command))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    environment = {**os.environ, "PYTHONIOENCODING": "utf-8"}
+    code = f"import sys\nsys.{closed} = None\n{COMMAND}"
+    done = run(code, env=environment, capture_output=True, encoding="utf-8")
     assert done.returncode == 2
-    expected = {"stdout": ("", "error: to stderr\n"), "stderr": ("to stdout\n", "")}
-    assert (done.stdout, done.stderr) == expected[closed]
+    assert done.stdout == ("" if closed == "stdout" else "θ = ±1, g = 1 m/s² …\n")
+    assert done.stderr == ("" if closed == "stderr" else "warning: ε ≤ γ\nerror: “δ”\n")
 
 
 # Words of `shell_word`. The first three need nothing else in sh, cmd and PowerShell.

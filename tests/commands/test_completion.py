@@ -61,27 +61,20 @@ SCRIPT = "import sys; from keras_pendulum.__main__ import main; sys.exit(main())
 @pytest.mark.parametrize(
     ("line", "offered"),
     [
-        (f"{MODULE}.train --pres", {"--preset"}),
         (f"{MODULE}.train --tar", {"--target-update", "--target-period"}),  # hidden by --help
         (f"{MODULE}.train --target-b", {""}),  # an old name
         (f"{MODULE}.train --preset ", set(PRESETS)),
         (f"{MODULE}.train --preset=s", {"--preset=swingup"}),
         (f"{MODULE}.train --loss ", {"squared", "huber"}),
-        (f"{MODULE}.train --double-q t", {"true"}),
         (f"{MODULE}.train --init ", {*SHIPPED, "mine.h5", "model.keras", "runs/"}),
         (f"{MODULE}.train --out r", {"runs/"}),
         (f"{MODULE}.evaluate --gi", {"--gif"}),
         (f"{MODULE}.evaluate runs/one/", {"runs/one/pendulum_weight.h5"}),
-        (f"{MODULE}.evaluate reference --activation ", {"tanh", "relu", "linear"}),
         (f"{MODULE}.play --against sw", {"swingup"}),
-        (f"{MODULE}.page --o", {"--out", "--open"}),
-        (f"{MODULE}.page m", {"mine.h5", "model.keras"}),
         (f"{MODULE}.compare runs/", {"runs/one/"}),
         (f"{MODULE}.study --presets reference,w", {"reference,walkthrough"}),
         (f"{MODULE} tr", {"train"}),
-        (f"{MODULE} train --preset w", {"walkthrough"}),
         ("keras-pendulum ", {*COMMANDS, "-h", "--help", "--version"}),
-        ("keras-pendulum --v", {"--version"}),
         ("keras-pendulum evaluate orig", {"original"}),
         ("keras-pendulum train --preset cartpole --los", {"--loss"}),
     ],

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import h5py
 import pytest
-from conftest import ROOT
+from conftest import ROOT, Command
 
 import keras_pendulum as kp
-from keras_pendulum.tensorflow_setup import _ENVIRONMENT, fast_import
+from keras_pendulum.tensorflow_setup import _ENVIRONMENT, THREADS, fast_import
 
 CODE = "import os, keras_pendulum; print(os.environ['TF_NUM_INTRAOP_THREADS'])"
 AFTER_TENSORFLOW = """
@@ -30,15 +30,15 @@ for _ in range(2):
 OWN = {"TF_NUM_INTRAOP_THREADS": "4", "TF_ENABLE_ONEDNN_OPTS": "1"}
 
 
-def run(code: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs code in a process without variables of TensorFlow."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
     return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
+        [sys.executable, "-c", code],
         env=clean | environment,
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
 
 
@@ -48,27 +48,23 @@ def test_tensorflow_uses_one_thread_or_two_unless_the_user_sets_another_number()
     assert [run(code, **OWN).stdout for code in (CODE, two)] == ["4\n", "4\n"]
 
 
-TRAIN = """
-import os, sys
-from keras_pendulum.train.__main__ import main
-status = main([*sys.argv[1:], "--quiet"])
-print(status, os.environ["TF_NUM_INTRAOP_THREADS"])
-"""
-
-
 @pytest.mark.parametrize(("preset", "expected"), [("reference", "2"), ("original", "1")])
 def test_command_trains_with_two_threads_where_they_save_time(
-    preset: str, expected: str, tmp_path: Path
+    preset: str,
+    expected: str,
+    in_process: Command,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    words = ["--preset", preset, "--out", str(tmp_path / "run"), "--hidden-units", "8"]
-    runs = [["--episodes", "1"], ["--episodes", "2", "--resume"]]
-    for more in runs if preset == "reference" else runs[:1]:
-        done = run(TRAIN, *words, *more)
-        assert done.stdout.splitlines()[-1] == f"0 {expected}"
-        assert done.stderr == ""  # the resumed run has the number of threads of the checkpoint
+    monkeypatch.setattr("keras_pendulum.tensorflow_setup._MAY_CHOOSE_THREADS", True)
+    words = ["--preset", preset, "--out", "run", "--hidden-units", "8", "--quiet"]
+    for more in (["--episodes", "1"], ["--episodes", "2", "--resume"]):
+        done = in_process("train", *words, *more, environment={THREADS: "1"})
+        # The resumed run has the number of threads of the checkpoint.
+        assert (done.returncode, done.stderr) == (0, "")
     with h5py.File(tmp_path / "run" / "pendulum_weight.h5") as file:
         versions = json.loads(file["keras_pendulum"].attrs["versions"])
-    assert versions["TF_NUM_INTRAOP_THREADS"] == expected
+    assert versions[THREADS] == expected
 
 
 def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:
@@ -76,14 +72,9 @@ def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:
     assert done.stdout == "[]\n"
     assert done.stderr.count("TensorFlow was imported before keras_pendulum") == 1
     assert "TF_NUM_INTRAOP_THREADS=1 and TF_ENABLE_ONEDNN_OPTS=0" in done.stderr
-
-
-def test_users_own_settings_need_no_warning() -> None:
+    # The user's own settings need no warning, and neither does a package that is imported first.
     done = run(AFTER_TENSORFLOW, **OWN)
     assert (done.stdout, done.stderr) == (f"{sorted(OWN)}\n", "")
-
-
-def test_package_imported_first_needs_no_warning() -> None:
     code = AFTER_TENSORFLOW.replace("import os, sys", "import keras_pendulum, os, sys")
     assert run(code).stderr == ""
 
@@ -126,7 +117,8 @@ def test_first_use_of_a_public_name_imports_without_garbage_collection() -> None
         "keras_pendulum.DQN\n"
         "assert not collections and gc.isenabled() and gc.get_freeze_count() > 100_000\n"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    done = run(code)
+    assert done.returncode == 0, done.stderr
 
 
 NOTES = """\
@@ -153,17 +145,8 @@ with fast_import():
     {then}
 os.write(2, b"I0000 1 2 a.cc:3] a note later")
 """
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=clean | environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        encoding="utf-8",
-        check=False,
-    )
-    return done.stdout
+    done = run(code, **environment)
+    return done.stderr + done.stdout
 
 
 @pytest.mark.quick
@@ -172,14 +155,13 @@ def test_notes_of_tensorflow_are_removed_and_nothing_else() -> None:
 
 
 @pytest.mark.quick
-def test_notes_remain_with_the_users_own_log_level() -> None:
-    assert write_in_fast_import(TF_CPP_MIN_LOG_LEVEL="0").startswith(NOTES + OTHERS)
-
-
-@pytest.mark.quick
-def test_notes_remain_of_a_tensorflow_that_is_imported_already() -> None:
-    before = "sys.modules['tensorflow'] = os"
-    assert write_in_fast_import(before).startswith(NOTES + OTHERS)
+@pytest.mark.parametrize(
+    ("before", "environment"),
+    [("", {"TF_CPP_MIN_LOG_LEVEL": "0"}), ("sys.modules['tensorflow'] = os", {})],
+    ids=["the user's own log level", "TensorFlow is imported already"],
+)
+def test_notes_remain(before: str, environment: dict[str, str]) -> None:
+    assert write_in_fast_import(before, **environment).startswith(NOTES + OTHERS)
 
 
 @pytest.mark.quick
