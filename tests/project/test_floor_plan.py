@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -28,22 +30,25 @@ LIBRARIES_OF_DQN = ("numpy", "keras", "tensorflow")
 ORDER = ("__main__", "diagnose", *ROOMS, *WITHOUT_ROOM)
 
 
-def imported_modules(path: Path, package: Path = PACKAGE) -> Iterator[str]:
-    """Yields the modules of the package that a file imports, such as `dqn.network`."""
+def imports(path: Path) -> Iterator[str]:
+    """Yields what a file imports, such as `numpy` or `keras_pendulum.dqn.network.DQN`."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names: list[str] = []
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-        for name in names:
-            parts = name.split(".")
-            if parts[0] == "keras_pendulum":
-                # Drops the imported name: `dqn.network.DQN` becomes `dqn.network`.
-                while parts[1:] and not is_module(package, parts[1:]):
-                    parts.pop()
-                yield ".".join(parts[1:])
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def imported_modules(path: Path, package: Path = PACKAGE) -> Iterator[str]:
+    """Yields the modules of the package that a file imports, such as `dqn.network`."""
+    for name in imports(path):
+        parts = name.split(".")
+        if parts[0] == "keras_pendulum":
+            # Drops the imported name: `dqn.network.DQN` becomes `dqn.network`.
+            while parts[1:] and not is_module(package, parts[1:]):
+                parts.pop()
+            yield ".".join(parts[1:])
 
 
 def is_module(package: Path, parts: list[str]) -> bool:
@@ -58,36 +63,23 @@ def module_name(path: Path, package: Path = PACKAGE) -> str:
 def problems(package: Path = PACKAGE) -> list[str]:
     """Returns a line for each upward or circular import of a package."""
     found: list[str] = []
-    imports: dict[str, set[str]] = {}
+    imported: dict[str, set[str]] = {}
     for path in sorted(package.rglob("*.py")):
         name = module_name(path, package)
         if name == "__init__":  # the public names, from everywhere
             continue
-        imports[name] = set(imported_modules(path, package)) - {name}
+        imported[name] = set(imported_modules(path, package)) - {name}
         room = name.split(".")[0]
-        for other in sorted(imports[name]):
+        for other in sorted(imported[name]):
             if not other:
                 found.append(f"{path.relative_to(package)} imports the package itself")
             elif ORDER.index(other.split(".")[0]) < ORDER.index(room):
                 found.append(f"{path.relative_to(package)} imports {other}, which is above it")
-    found += [f"circular imports: {' -> '.join(circle)}" for circle in circles(imports)]
+    try:
+        TopologicalSorter(imported).prepare()
+    except CycleError as error:
+        found.append(f"circular imports: {' <- '.join(error.args[1])}")
     return found
-
-
-def circles(imports: dict[str, set[str]]) -> Iterator[list[str]]:
-    """Yields the circles among the modules, found by a depth-first search."""
-    finished: set[str] = set()
-
-    def visit(name: str, path: list[str]) -> Iterator[list[str]]:
-        if name in path:
-            yield [*path[path.index(name) :], name]
-        elif name not in finished:
-            for other in sorted(imports.get(name, ())):
-                yield from visit(other, [*path, name])
-            finished.add(name)
-
-    for name in sorted(imports):
-        yield from visit(name, [])
 
 
 def test_imports_go_down_the_floor_plan() -> None:
@@ -103,15 +95,9 @@ def test_every_module_has_a_place_in_the_floor_plan() -> None:
 
 def test_dqn_imports_nothing_else_of_the_package_or_of_others() -> None:
     for path in (PACKAGE / "dqn").glob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            names = [alias.name for alias in getattr(node, "names", [])]
-            if isinstance(node, ast.ImportFrom):
-                names = [node.module or ""]
-            elif not isinstance(node, ast.Import):
-                continue
-            for name in names:
-                known = name.partition(".")[0] in (*sys.stdlib_module_names, *LIBRARIES_OF_DQN)
-                assert known or name.startswith("keras_pendulum.dqn."), f"{path.name}: {name}"
+        for name in imports(path):
+            known = name.partition(".")[0] in (*sys.stdlib_module_names, *LIBRARIES_OF_DQN)
+            assert known or name.startswith("keras_pendulum.dqn."), f"{path.name}: {name}"
 
 
 def test_few_places_ask_which_task_it_is() -> None:
@@ -133,64 +119,54 @@ def test_rooms_have_an_empty_init() -> None:
     assert [path for path in PACKAGE.glob("*/__init__.py") if path.read_text() != ""] == []
 
 
-@pytest.mark.parametrize(
-    ("file", "line", "problem"),
-    [
-        (
-            "dqn/agent.py",
-            "from keras_pendulum.train.loop import train_episodes",
-            "dqn/agent.py imports train.loop, which is above it",
-        ),
-        (
-            "cli.py",
-            "from keras_pendulum.__main__ import COMMANDS",
-            "cli.py imports __main__, which is above it",
-        ),
-        (
-            "errors.py",
-            "import keras_pendulum.cli",
-            "errors.py imports cli, which is above it",
-        ),
-        (
-            "train/loop.py",
-            "from keras_pendulum.train import train_dqn",
-            "circular imports: train.train_dqn -> train.loop -> train.train_dqn",
-        ),
-        (
-            "storage/load_weights.py",
-            "from keras_pendulum import __version__",
-            "storage/load_weights.py imports the package itself",
-        ),
-    ],
-)
-def test_wrong_import_is_reported_with_its_file(
-    file: str, line: str, problem: str, tmp_path: Path
-) -> None:
-    for path in PACKAGE.rglob("*.py"):
-        copy = tmp_path / path.relative_to(PACKAGE)
-        copy.parent.mkdir(exist_ok=True)
-        copy.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-    with (tmp_path / file).open("a", encoding="utf-8") as changed:
+# Files, each with a wrong import, and its problem.
+WRONG = {
+    "dqn/agent.py": (
+        "from keras_pendulum.train.loop import train_episodes",
+        "dqn/agent.py imports train.loop, which is above it",
+    ),
+    "errors.py": ("import keras_pendulum.cli", "errors.py imports cli, which is above it"),
+    "storage/load_weights.py": (
+        "from keras_pendulum import __version__",
+        "storage/load_weights.py imports the package itself",
+    ),
+    "play/control_c.py": (
+        "from keras_pendulum.play import __main__",
+        "circular imports: play.__main__ <- play.control_c <- play.__main__",
+    ),
+}
+
+
+@pytest.mark.parametrize("file", WRONG)
+def test_wrong_import_is_reported_with_its_file(file: str, tmp_path: Path) -> None:
+    line, problem = WRONG[file]
+    package = shutil.copytree(PACKAGE, tmp_path / "package")
+    with (package / file).open("a", encoding="utf-8") as changed:
         changed.write(f"\n{line}\n")
-    assert problem in problems(tmp_path)
+    assert problem in problems(package)
 
 
-@pytest.mark.parametrize(
-    "first",
-    [
-        "kp.Diagnosis",
-        "import keras_pendulum.diagnosis.diagnosis",
-        "from keras_pendulum.__main__ import main; main(['diagnose', 'nothing.h5'])",
-        "import runpy; sys.argv = ['diagnose', 'nothing.h5']\n"
-        "try: runpy.run_module('keras_pendulum.diagnose', run_name='__main__', alter_sys=True)\n"
-        "except SystemExit: pass",
-        "try: import keras_pendulum.diagnose\n"
-        "except ImportError as error: assert 'from keras_pendulum import diagnose' in str(error)\n"
-        "else: raise SystemExit('imported')",
-    ],
-    ids=["class", "room", "command of the package", "command", "import of the command"],
-)
-def test_function_is_not_hidden_by_the_command_of_its_name(first: str) -> None:
-    code = f"import sys\nimport keras_pendulum as kp\n{first}\nassert callable(kp.diagnose)\n"
-    code += "from keras_pendulum import diagnose\nassert diagnose is kp.diagnose"
-    subprocess.run([sys.executable, "-c", code], check=True)
+USES = """
+import runpy, sys
+import keras_pendulum as kp
+from keras_pendulum.__main__ import main
+
+try:
+    import keras_pendulum.diagnose
+except ImportError as error:
+    assert "from keras_pendulum import diagnose" in str(error)
+else:
+    raise SystemExit("imported")
+assert main(["diagnose", "nothing.h5"]) == 2
+sys.argv = ["diagnose", "nothing.h5"]
+try:
+    runpy.run_module("keras_pendulum.diagnose", run_name="__main__", alter_sys=True)
+except SystemExit as exit:
+    assert exit.code == 2
+from keras_pendulum import diagnose
+assert callable(diagnose) and diagnose is kp.diagnose
+"""
+
+
+def test_function_is_not_hidden_by_the_command_of_its_name() -> None:
+    subprocess.run([sys.executable, "-c", USES], check=True)

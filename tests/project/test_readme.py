@@ -86,7 +86,6 @@ def test_command_has_the_flags_that_the_pages_use(line: str, in_process: Command
 
 def test_map_of_rooms_is_complete_and_in_the_order_of_imports() -> None:
     assert re.findall(r"^\| `(\w+)/` \|", README, re.MULTILINE) == list(ROOMS)
-    assert set(ROOMS) == {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
-from conftest import TESTS, command_line
+from conftest import TESTS
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="this is Windows, not simulated")
 
@@ -23,17 +22,12 @@ import json, sys
 from keras_pendulum.__main__ import main
 
 for words in json.loads(sys.argv[1]):
+    if words[0] == "page":
+        from keras_pendulum.page import build
+
+        build.THETA_CELLS = 50  # a coarse optimum is much faster
     assert main(words) == 0, words
 """
-
-
-def without_gpu_note(output: str) -> str:
-    """Removes the note of the package `tensorflow` for Linux that there is no GPU.
-
-    Keras 2 installs that package in the tests' environment. On Windows it prints no such note, so
-    the package removes none there.
-    """
-    return re.sub(r"^(WARNING: All log messages|I\d{4} ).*\n", "", output, flags=re.M)
 
 
 class Windows:
@@ -48,7 +42,7 @@ class Windows:
     def run(self, *words: str | os.PathLike[str]) -> subprocess.CompletedProcess[str]:
         """Runs a program with an output in cp1252."""
         search_path = [str(self.site), str(TESTS.parent), os.environ.get("PYTHONPATH", "")]
-        done = subprocess.run(
+        return subprocess.run(
             words,
             cwd=self.folder,
             env={
@@ -61,8 +55,6 @@ class Windows:
             encoding="cp1252",
             check=False,
         )
-        done.stderr = without_gpu_note(done.stderr)
-        return done
 
     def output(self, *commands: Sequence[str]) -> str:
         """Returns the output of commands that have no error."""
@@ -130,7 +122,7 @@ def test_run_is_trained_replaced_resumed_compared_and_evaluated(windows: Windows
         ["train", *SMALL, "--episodes", "2", "--overwrite"],
         ["train", "--resume", "--episodes", "3", "--out", run.name],
         ["compare", run.name, "--out", "runs.png"],
-        ["evaluate", f"{run.name}/pendulum_weight.h5", "--episodes", "2", "--gif", "film.gif"],
+        ["evaluate", f"{run.name}/pendulum_weight.h5", "--episodes", "2"],
         ["page", "reference", "--out", "page.html"],
     )
     assert 'evaluate "my run/pendulum_weight.h5" --episodes 3 --render\n' in printed
@@ -141,7 +133,6 @@ def test_run_is_trained_replaced_resumed_compared_and_evaluated(windows: Windows
     assert "| my run | original |    0 |        3 |" in printed
     assert (windows.folder / "runs.png").read_bytes().startswith(b"\x89PNG")
     assert "Greedy on 2 fixed starts, Pendulum-v1, g = 1: " in printed
-    assert (windows.folder / "film.gif").read_bytes().startswith(b"GIF8")
     assert "-m keras_pendulum.storage.hdf5_reader " in windows.processes()
     page = windows.folder / "page.html"
     assert page.as_uri() in printed
@@ -151,7 +142,7 @@ def test_run_is_trained_replaced_resumed_compared_and_evaluated(windows: Windows
 
 def test_study_of_two_runs_is_made_and_continued(windows: Windows) -> None:
     words = ["study", "--arm", "con: original episodes=1 hidden_units=8", "--seeds", "2"]
-    printed = windows.output([*words, "--workers", "2"], words)
+    printed = windows.output([*words, "--workers", "1"], words)
     assert "2 runs in " in printed
     assert "\n2 of 2 runs are already finished" in printed  # read from the files
     study = windows.folder / "studies" / "arm-con"
@@ -165,11 +156,3 @@ def test_study_of_two_runs_is_made_and_continued(windows: Windows) -> None:
     assert len((study / "seconds.csv").read_bytes().splitlines()) == 3
     # The workers are simulated too.
     assert "from multiprocessing.spawn import spawn_main" in windows.processes()
-
-
-def test_wrong_input_is_one_line_in_the_code_page(windows: Windows) -> None:
-    done = windows.run(*command_line("play", "--against", "größe θ.h5"))
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == (
-        r"error: größe \u03b8.h5: no such file; expected a weights file (.h5)" + "\n"
-    )

@@ -7,10 +7,8 @@ from typing import Any
 import pytest
 import yaml
 from conftest import ROOT
-from test_dependencies import CONFIG, PYTHONS
+from test_dependencies import PYTHONS
 from test_readme import fenced
-
-from keras_pendulum.train.__main__ import main
 
 WORKFLOW = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
 JOB = WORKFLOW["jobs"]["quick"]
@@ -49,11 +47,3 @@ def test_commands_are_the_first_line_of_the_readme_and_the_quick_tests(system: s
         'python -m pip install -q -e ".[test]"',
         "python -m pytest -m quick",
     ]
-
-
-def test_extra_marker_and_flag_of_the_commands_exist(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "test" in CONFIG["options.extras_require"]
-    assert "\nquick:" in CONFIG["tool:pytest"]["markers"]
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    assert "--episodes" in capsys.readouterr().out
