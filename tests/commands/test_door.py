@@ -70,7 +70,6 @@ def test_usage_of_a_command_is_what_the_user_typed(
     ("words", "message"),
     [
         (["evalute", "x.h5"], "unknown command 'evalute'; expected one of train, evaluate, "),
-        (["evalute", "x.h5"], "; did you mean evaluate?"),
         (["Train"], "; did you mean train?"),
         (["trains", "--episodes", "5"], "; did you mean train?"),
         (["reward"], "study\n"),

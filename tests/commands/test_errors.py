@@ -32,15 +32,6 @@ def test_long_message_keeps_its_beginning_and_its_end() -> None:
     assert message.count("…") == 1
 
 
-def test_api_escapes_and_shortens_the_name_of_a_file(tmp_path: Path) -> None:
-    with pytest.raises(kp.WeightsError) as caught:
-        kp.load_weights(tmp_path / "a\n\x1b[31m")
-    assert r"a\n\x1b[31m: no such file" in str(caught.value)
-    with pytest.raises(kp.ConfigError) as config_error:
-        kp.preset("x" * 60_000)
-    assert len(str(config_error.value)) == 300
-
-
 @pytest.mark.parametrize(
     ("main", "words"),
     [

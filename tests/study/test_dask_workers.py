@@ -143,8 +143,11 @@ def running_scheduler(folder: Path) -> Iterator[tuple[subprocess.Popen[bytes], s
         yield process, json.loads(file.read_text())["address"]
 
 
-def running_worker(address: str) -> AbstractContextManager[object]:
-    return running("distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1")
+def running_worker(
+    address: str, *words: str | Path
+) -> AbstractContextManager[subprocess.Popen[bytes]]:
+    options = ["--no-nanny", "--nthreads", "1", *words]
+    return running("distributed.cli.dask_worker", address, *options)
 
 
 @contextmanager

@@ -9,11 +9,12 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
-from conftest import running_module, status_of, wait_for
+from conftest import status_of
+from test_dask_workers import running_scheduler, running_worker
 
 from keras_pendulum.study import __main__ as study_command
 from keras_pendulum.study.arms import own_arms
@@ -96,30 +97,21 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def continue_on_cluster(words: list[str], folder: Path) -> tuple[str, str]:
     """Returns the output of a study whose cluster loses its only worker, and gets another."""
-    file, preload = folder / "scheduler.json", folder / "killed.py"
+    preload = folder / "killed.py"
     preload.write_text(KILLED_IN_A_RUN, encoding="utf-8")
-    place = ["--scheduler-file", str(file), "--no-dashboard"]
-    server = ["distributed.cli.dask_scheduler", *place, "--host", "127.0.0.1", "--port", "0"]
-    worker = ["distributed.cli.dask_worker", *place, "--no-nanny", "--nthreads", "1"]
     output, problems = io.StringIO(), io.StringIO()
-    with running(*server):
-        wait_for(lambda: file.exists() and file.read_text().endswith("}"))
-        address = json.loads(file.read_text())["address"]
-        with (
-            redirect_stdout(output),
-            redirect_stderr(problems),
-            ThreadPoolExecutor() as pool,
-            running(*worker, "--preload", preload) as first,
-        ):
-            study = pool.submit(study_command.main, [*words, "--scheduler", address])
-            first.wait()
-            with running(*worker):
-                assert study.result() == 0
+    with (
+        running_scheduler(folder) as (_, address),
+        redirect_stdout(output),
+        redirect_stderr(problems),
+        ThreadPoolExecutor() as pool,
+        running_worker(address, "--preload", preload) as first,
+    ):
+        study = pool.submit(study_command.main, [*words, "--scheduler", address])
+        first.wait()
+        with running_worker(address):
+            assert study.result() == 0
     return output.getvalue(), problems.getvalue()
-
-
-def running(module: str, *words: str | Path) -> AbstractContextManager[subprocess.Popen[bytes]]:
-    return running_module(module, *words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
 def test_killed_study_continues_and_repeats_no_run(finished: Path) -> None:
