@@ -71,7 +71,6 @@ def test_usage_of_a_command_is_what_the_user_typed(
     [
         (["evalute", "x.h5"], "unknown command 'evalute'; expected one of train, evaluate, "),
         (["Train"], "; did you mean train?"),
-        (["trains", "--episodes", "5"], "; did you mean train?"),
         (["reward"], "study\n"),
         ([""], "unknown command ''"),
         (["\x1b[31m\n"], r"unknown command '\x1b[31m\n'"),
