@@ -14,9 +14,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-# Before the package's import: one test runs on each core, so each process has one thread.
-os.environ.setdefault("TF_NUM_INTRAOP_THREADS", "1")
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -226,7 +226,10 @@ WRONG = [
         ["train", "--preset", "cartpole-original", "--init", RECORDED],
         "has observation_size 3, the settings say 4",
     ),
-    (["train", "--init", "cartpole"], "records the activation relu, not tanh, for CartPole-v1"),
+    (
+        ["train", "--init", "cartpole"],
+        "for CartPole-v1 with the activation relu, not tanh",
+    ),
     (["train", "--out", "text.h5"], "cannot make the folder text.h5"),
     (["train", "--live", "--render"], "not allowed with"),
     (["evaluate"], "the following arguments are required: AGENT"),

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import gc
-import json
 import os
 import subprocess
 import sys
 import warnings
-from pathlib import Path
 
-import h5py
 import pytest
-from conftest import ROOT, Command
+from conftest import ROOT
 
 import keras_pendulum as kp
-from keras_pendulum.tensorflow_setup import _ENVIRONMENT, THREADS, fast_import
+from keras_pendulum.tensorflow_setup import _ENVIRONMENT, fast_import
 
 CODE = "import os, keras_pendulum; print(os.environ['TF_NUM_INTRAOP_THREADS'])"
 AFTER_TENSORFLOW = """
@@ -42,29 +39,8 @@ def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_tensorflow_uses_one_thread_or_two_unless_the_user_sets_another_number() -> None:
-    two = "from keras_pendulum.tensorflow_setup import use_two_threads as two; two();" + CODE
-    assert [run(code).stdout for code in (CODE, two)] == ["1\n", "2\n"]
-    assert [run(code, **OWN).stdout for code in (CODE, two)] == ["4\n", "4\n"]
-
-
-@pytest.mark.parametrize(("preset", "expected"), [("reference", "2"), ("original", "1")])
-def test_command_trains_with_two_threads_where_they_save_time(
-    preset: str,
-    expected: str,
-    in_process: Command,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("keras_pendulum.tensorflow_setup._MAY_CHOOSE_THREADS", True)
-    words = ["--preset", preset, "--out", "run", "--hidden-units", "8", "--quiet"]
-    for more in (["--episodes", "1"], ["--episodes", "2", "--resume"]):
-        done = in_process("train", *words, *more, environment={THREADS: "1"})
-        # The resumed run has the number of threads of the checkpoint.
-        assert (done.returncode, done.stderr) == (0, "")
-    with h5py.File(tmp_path / "run" / "pendulum_weight.h5") as file:
-        versions = json.loads(file["keras_pendulum"].attrs["versions"])
-    assert versions[THREADS] == expected
+def test_tensorflow_uses_one_thread_unless_the_user_sets_another_number() -> None:
+    assert [run(CODE).stdout, run(CODE, **OWN).stdout] == ["1\n", "4\n"]
 
 
 def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:

@@ -38,7 +38,7 @@ def test_agent_has_the_name_that_was_typed(
     monkeypatch.chdir(weights.parent)
     Path("code.py").write_text("def hold(observation):\n    return 2.0\n", encoding="utf-8")
     for word in (weights.name, "code.py:hold"):
-        assert command.main([word]) == 0
+        assert command.main([word, "--gravity", "1"]) == 0
         assert f"\nAgent {word}, g = 1, " in capsys.readouterr().out
 
 

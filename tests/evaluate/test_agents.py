@@ -250,7 +250,7 @@ def test_wrong_torques_are_refused(torques: Any, problem: str, network: kp.DQN) 
 
 @pytest.mark.parametrize(
     "source",
-    [a_torque, PredictsTorque, q_in_numpy, lambda network: kp.load_policy("cartpole")],
+    [PredictsTorque, q_in_numpy, lambda network: kp.load_policy("cartpole")],
 )
 def test_torques_are_refused_where_nothing_stands_for_one(source: Any, network: kp.DQN) -> None:
     with pytest.raises(kp.ConfigError, match=r"^torques "):
@@ -293,6 +293,8 @@ def answering(answer: Any) -> Policy:
         (np.zeros(2), r"an array of the shape \[2\]; expected a torque in N·m"),
         (np.zeros((1, 1)), r"an array of the shape \[1, 1\]"),
         ("left", "a str of the type <U4"),
+        (1, r"the integer 1; expected a torque as a floating-point number; for an index, give"),
+        (np.int8(1), "the integer 1"),
         (None, "a NoneType of the type object"),
         (True, "a bool of the type bool"),
         ([[1], [2, 3]], "a list; expected a torque in N·m"),
@@ -304,10 +306,18 @@ def test_answer_that_is_no_torque_is_refused(answer: Any, problem: str) -> None:
 
 
 def test_torques_in_all_libraries_and_types_are_accepted() -> None:
-    for answer in (1, np.float32(1), np.array([1]), [1.0], torch.ones(1), tf.ones(()), np.int8(1)):
+    for answer in (1.0, np.float32(1), np.array([1.0]), [1.0], torch.ones(1), tf.ones(())):
         np.testing.assert_array_equal(answering(answer).act(OBSERVATIONS), np.ones((9, 1)))
     half = torch.ones(1, dtype=torch.bfloat16, requires_grad=True)
     np.testing.assert_array_equal(answering(half).act(OBSERVATIONS), np.ones((9, 1)))
+
+
+def test_integers_of_a_function_are_indices_of_its_torques() -> None:
+    for index in (2, np.int64(2), np.array([2])):
+        agent = as_policy(lambda observation, index=index: index, torques=[-2, 0, 1.5])
+        np.testing.assert_array_equal(agent.act(OBSERVATIONS), np.full((9, 1), 1.5))
+    with pytest.raises(ActionError, match="the index 3; expected an integer from 0 to 2"):
+        as_policy(lambda observation: 3, torques=[-2, 0, 1.5]).act(OBSERVATIONS)
 
 
 @pytest.mark.parametrize(

@@ -32,9 +32,9 @@ def test_many_episodes_are_made_side_by_side(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(evaluation, "_SIDE_BY_SIDE", 3)
     batches: list[tuple[int, ...]] = []
     agent = asked(batches)
-    score = kp.evaluate_policy(agent, 7, seed=5)
+    score = kp.evaluate_policy(agent, 7, seed=5, gravity=1.0)
     assert batches == [(3, 3)] * 400 + [(1, 3)] * 200
-    expected = kp.evaluate_policy(NETWORK, 7, seed=5)
+    expected = kp.evaluate_policy(NETWORK, 7, seed=5, gravity=1.0)
     np.testing.assert_allclose(score.returns, expected.returns, rtol=1e-9)
 
 
@@ -42,10 +42,12 @@ def test_watched_episodes_are_made_one_by_one() -> None:
     batches: list[tuple[int, ...]] = []
     agent = asked(batches)
     steps: list[Any] = []
-    score = kp.evaluate_policy(agent, 2, on_step=steps.append)
+    score = kp.evaluate_policy(agent, 2, gravity=1.0, on_step=steps.append)
     assert batches == [(1, 3)] * 400
     assert len(steps) == 402
-    np.testing.assert_allclose(score.returns, kp.evaluate_policy(NETWORK, 2).returns, rtol=1e-9)
+    np.testing.assert_allclose(
+        score.returns, kp.evaluate_policy(NETWORK, 2, gravity=1.0).returns, rtol=1e-9
+    )
 
 
 def test_function_with_a_state_sees_one_episode_after_the_other() -> None:
@@ -55,7 +57,7 @@ def test_function_with_a_state_sees_one_episode_after_the_other() -> None:
         seen.append(observation.copy())
         return 0.0
 
-    kp.evaluate_policy(act, 2)
+    kp.evaluate_policy(act, 2, gravity=1.0)
     speeds = np.array(seen)[:, 2]
     assert len(seen) == 400
     # The pendulum cannot jump within an episode: 0.75 rad/s² of gravity and 1.5 of torque a step.
@@ -82,7 +84,7 @@ def test_wrong_answer_is_reported_with_episode_and_step(
     agent: Any = kp.q_function(values) if batched else torque
     problem = "a Q-value that is not finite" if batched else "the torque 2.5 N·m; expected .*"
     with pytest.raises(kp.UserError, match=rf"^episode 3, step 0: the agent returned {problem}$"):
-        kp.evaluate_policy(agent, 5, seed=1)
+        kp.evaluate_policy(agent, 5, seed=1, gravity=1.0)
 
 
 def test_exception_of_the_agent_is_reported_with_its_place() -> None:
@@ -96,5 +98,5 @@ def test_exception_of_the_agent_is_reported_with_its_place() -> None:
         r"^episode 1, step 2: the agent raised ZeroDivisionError: .*test_episodes\.py, line \d+"
     )
     with pytest.raises(kp.UserError, match=problem) as caught:
-        kp.evaluate_policy(act, 2)
+        kp.evaluate_policy(act, 2, gravity=1.0)
     assert caught.value.__cause__ is not None

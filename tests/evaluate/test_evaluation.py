@@ -152,10 +152,23 @@ def test_number_out_of_range_is_refused_by_name(
         kp.evaluate_policy(kp.DQN((8,)), episodes, seed, gravity=gravity)
 
 
+@pytest.mark.parametrize("gravity", [1.0, 10.0])
+def test_agent_without_a_task_is_judged_at_the_gravity_where_it_is_good(gravity: float) -> None:
+    """Gymnasium's default is 10, that of the presets is 1."""
+    policy = kp.load_policy("reference" if gravity == 1 else "swingup")
+    assumed = kp.evaluate_policy(kp.q_function(policy.q_values), 5)
+    declared = kp.evaluate_policy(kp.q_function(policy.q_values), 5, gravity=gravity)
+    assert (assumed.gravity, assumed.regret) == (gravity, declared.regret)
+    assert assumed.summary().splitlines()[1].startswith("The agent records no gravity. It gains ")
+    assert declared.assumption == kp.evaluate_policy(policy, 1).assumption == ""
+    diagnosis = kp.diagnose(kp.q_function(policy.q_values))
+    assert diagnosis.measurement.task == Pendulum(gravity)
+    assert "The agent records no gravity" in diagnosis.summary().splitlines()[2]
+
+
 @pytest.mark.parametrize(
     ("recorded", "given", "gravity"),
     [
-        (None, None, 1.0),
         (10.0, None, 10.0),
         (10.0, 2, 2.0),
         (10.0, 0, 0.0),
@@ -163,7 +176,7 @@ def test_number_out_of_range_is_refused_by_name(
         (None, 100, 100.0),
     ],
 )
-def test_gravity_is_the_given_one_else_the_recorded_one_else_1(
+def test_gravity_is_the_given_one_else_the_recorded_one(
     recorded: float | None, given: float | None, gravity: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(

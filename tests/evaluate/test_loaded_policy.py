@@ -44,11 +44,11 @@ def test_torque_is_that_of_the_highest_q_value_as_the_environment_takes_it() -> 
     assert len(set(indices)) > 3
     for observation, index in zip(PENDULUM, indices, strict=True):
         torque = policy(observation)
-        assert (torque.shape, torque.dtype) == ((1,), np.float64)
-        assert torque[0] == TORQUES[index]
+        assert (torque.shape, torque.dtype) == ((1,), np.float32)
+        assert torque[0] == np.float32(TORQUES[index])
     batch = policy(PENDULUM)
-    assert (batch.shape, batch.dtype) == ((50, 1), np.float64)
-    np.testing.assert_array_equal(batch[:, 0], TORQUES[indices])
+    assert (batch.shape, batch.dtype) == ((50, 1), np.float32)
+    np.testing.assert_array_equal(batch[:, 0], TORQUES[indices].astype(np.float32))
     assert policy(PENDULUM[:0]).shape == (0, 1)
 
 
@@ -175,7 +175,7 @@ def test_load_policy_takes_a_path_or_a_shipped_name() -> None:
     assert kp.load_policy("cartpole")(CARTPOLE[0]) in (0, 1)
     with pytest.raises(kp.WeightsError, match="nonsense: no such file"):
         kp.load_policy("nonsense")
-    with pytest.raises(kp.WeightsError, match="records the activation tanh, not relu"):
+    with pytest.raises(kp.WeightsError, match="with the activation tanh, not relu"):
         kp.load_policy("swingup", activation="relu")
 
 

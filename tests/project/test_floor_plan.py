@@ -23,7 +23,7 @@ ROOMS = (
     *("optimum", "storage", "config", "dqn", "environments"),
 )
 WITHOUT_ROOM = (
-    *("cli", "completion", "display", "tensorflow_setup"),
+    *("cli", "completion", "display", "tensorflow_setup", "status"),
     *("history", "limits", "version", "errors"),
 )
 LIBRARIES_OF_DQN = ("numpy", "keras", "tensorflow")

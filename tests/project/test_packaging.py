@@ -22,7 +22,7 @@ import keras_pendulum as kp
 
 FILES = (
     *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "MANIFEST.in", "README.md"),
-    *("pyproject.toml", "setup.cfg"),
+    *("pyproject.toml", "setup.cfg", "setup.py"),
 )
 FOLDERS = ("benchmarks", "docs", "examples", "keras_pendulum", "tests", "weights")
 
@@ -112,6 +112,21 @@ def test_installed_wheel_evaluates_the_shipped_weights(built: Built, tmp_path: P
         assert re.search(rf"^  {path.stem} .* -?\d+\.\d\d$", shown, re.MULTILINE)
     printed = succeed([script, "evaluate", "--help"], tmp_path, "no help", installed)
     assert printed.startswith("usage: keras-pendulum evaluate ")
+
+
+def test_editable_install_is_a_path_that_a_clone_of_the_same_name_does_not_hide(
+    built: Built, tmp_path: Path
+) -> None:
+    clone = tmp_path / "keras_pendulum"
+    shutil.copytree(built.sdist, clone, ignore=shutil.ignore_patterns("build", "dist"))
+    build("editable", clone)
+    (wheel,) = clone.glob("dist/*.whl")
+    shutil.unpack_archive(wheel, tmp_path / "site", "zip")
+    code = "import site; site.addsitedir('site'); import keras_pendulum as kp; "
+    code += "print(kp.__file__, kp.find_weights('original'), sep='\\n')"
+    printed = succeed([sys.executable, "-S", "-c", code], tmp_path, "no import")
+    expected = [clone / "keras_pendulum" / "__init__.py", clone / "weights" / "original.h5"]
+    assert printed.splitlines() == list(map(str, expected))
 
 
 def test_editable_install_of_the_readme_has_the_weights_of_the_checkout() -> None:

@@ -264,7 +264,7 @@ def test_activation_is_for_files_that_record_none(tmp_path: Path) -> None:
     assert kp.load_weights(tmp_path / "a.weights.h5", "relu").activation == "relu"
     kp.save_weights(kp.DQN((8,), activation="relu"), tmp_path / "b.h5")
     assert kp.load_weights(tmp_path / "b.h5", "relu").activation == "relu"
-    with pytest.raises(kp.WeightsError, match="records the activation relu, not tanh"):
+    with pytest.raises(kp.WeightsError, match="with the activation relu, not tanh"):
         kp.load_weights(tmp_path / "b.h5", "tanh")
     with pytest.raises(kp.ConfigError, match="activation is elu"):
         kp.load_weights(tmp_path / "a.weights.h5", "elu")
