@@ -95,41 +95,42 @@ def test_config_cannot_be_changed() -> None:
         Config().episodes = 3  # type: ignore[misc]
 
 
-def test_checkpoint_too_large_to_load_is_refused() -> None:
-    with pytest.raises(kp.ConfigError, match=r"checkpoint of 1\.0 GiB; the limit is 1 GiB"):
-        kp.preset("reference", hidden_units=(8192, 8192))
-    with pytest.raises(kp.ConfigError, match=r"make a checkpoint of 1\.2 GiB"):
-        kp.preset("cartpole-original", hidden_units=(8000, 7000), replay_capacity=4_000_000)
-    assert kp.preset("reference", hidden_units=(8192, 6000)).hidden_units == (8192, 6000)
+# The largest checkpoints: with each of the changes, they are too large. For reference, 49 436 809
+# weights in 4 copies, 33 bytes for each transition, 64 for each episode and 16 for each evaluation;
+# for cartpole-original, 49 210 962 weights in 5 copies, and 41 bytes for each transition.
+assert 16 * 49_436_809 + 33 * 8_535_792 + 64 * 362 == 2**30 - 2**20
+assert 20 * 49_210_962 + 41 * 2_157_848 + 64 * 35 == 2**30 - 2**20
+LARGEST: list[tuple[str, dict[str, int], list[dict[str, Any]]]] = [
+    (
+        "reference",
+        {"replay_capacity": 8_535_792, "episodes": 362},
+        [
+            *({"replay_capacity": 8_535_793}, {"episodes": 363}, {"torque_count": 42}),
+            *({"optimizer": "adamw"}, {"average_updates": 2}, {"hidden_units": (8192, 8192)}),
+        ],
+    ),
+    # 4 evaluations in place of the last episode.
+    (
+        "reference",
+        {"replay_capacity": 8_535_792, "episodes": 361, "evaluate_every": 90},
+        [{"evaluate_every": 72}],
+    ),
+    (
+        "cartpole-original",
+        {"replay_capacity": 2_157_848, "episodes": 35},
+        [{"replay_capacity": 2_157_849}],
+    ),
+]
 
 
-def test_largest_checkpoint_is_accepted_and_a_larger_one_is_refused() -> None:
-    # 49 436 809 weights in 4 copies, 33 bytes for each transition and 64 for each episode are
-    # 1 GiB - 1 MiB, which leaves 1 MiB for the rest of the file.
-    assert 16 * 49_436_809 + 33 * 8_535_792 + 64 * 362 == 1_073_741_824 - 1_048_576
-    largest = kp.preset(
-        "reference", hidden_units=(8192, 6000), replay_capacity=8_535_792, episodes=362
-    )
-    larger: list[dict[str, Any]] = [
-        {"replay_capacity": 8_535_793},
-        {"episodes": 363},
-        {"torque_count": 42},
-        {"optimizer": "adamw"},
-        {"average_updates": 2},
-    ]
+@pytest.mark.parametrize(("preset", "settings", "larger"), LARGEST)
+def test_largest_checkpoint_is_accepted_and_a_larger_one_is_refused(
+    preset: str, settings: dict[str, Any], larger: list[dict[str, Any]]
+) -> None:
+    largest = kp.preset(preset, hidden_units=(8192, 6000), **settings)
     for changes in larger:
-        with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
+        with pytest.raises(kp.ConfigError, match=r"a checkpoint of 1\.\d GiB; the limit is 1 GiB"):
             dataclasses.replace(largest, **changes)
-
-
-def test_largest_checkpoint_of_cartpole_has_41_bytes_for_each_transition() -> None:
-    # 49 210 962 weights in 5 copies.
-    assert 20 * 49_210_962 + 41 * 2_157_848 + 64 * 35 == 1_073_741_824 - 1_048_576
-    largest = kp.preset(
-        "cartpole-original", hidden_units=(8192, 6000), replay_capacity=2_157_848, episodes=35
-    )
-    with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
-        dataclasses.replace(largest, replay_capacity=2_157_849)
 
 
 def test_1_and_16_hidden_layers_of_1_to_8192_units_are_accepted() -> None:
@@ -147,19 +148,6 @@ def assert_largest_batch(config: Config, stored: int) -> None:
     message = f"^batch_size {stored + 1} is larger than the {stored} transitions"
     with pytest.raises(kp.ConfigError, match=message):
         dataclasses.replace(config, batch_size=stored + 1)
-
-
-def test_each_evaluation_adds_16_bytes_to_the_largest_checkpoint() -> None:
-    # As above, with 4 evaluations in place of the last of 362 episodes.
-    largest = kp.preset(
-        "reference",
-        hidden_units=(8192, 6000),
-        replay_capacity=8_535_792,
-        episodes=361,
-        evaluate_every=90,
-    )
-    with pytest.raises(kp.ConfigError, match=r"make a checkpoint of .* the limit is 1 GiB"):
-        dataclasses.replace(largest, evaluate_every=72)
 
 
 @pytest.mark.parametrize("warmup", [0, 1, 41])

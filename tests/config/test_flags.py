@@ -110,10 +110,6 @@ def test_old_flag_is_refused_with_the_new_one(name: str) -> None:
             typed(*words)
 
 
-def test_help_lists_the_settings_without_the_old_names(help_lines: dict[str, str]) -> None:
-    assert set(help_lines) == {flag(name) for name in SETTINGS}
-
-
 def test_short_help_shows_ten_settings_and_those_of_the_recording() -> None:
     shown = set(flags_in(make_parser().format_help()))
     assert shown > {"--save-every", "--evaluate-every", "--keep-best", "--snapshots"}
@@ -191,10 +187,3 @@ def test_help_says_when_a_setting_has_an_effect(help_lines: dict[str, str]) -> N
     assert "; only with target_update soft [" in help_lines["--tau"]
     assert "; only with evaluate_every above 0 [" in help_lines["--keep-best"]
     assert "; only with environment Pendulum-v1, else none [" in help_lines["--gravity"]
-
-
-def test_a_value_out_of_range_is_refused_by_the_config() -> None:
-    settings = typed("--episodes", "0")
-    assert settings == {"episodes": 0}
-    with pytest.raises(kp.ConfigError, match=r"^episodes is 0; expected a whole number from 1"):
-        kp.preset("reference", **settings)

@@ -146,31 +146,26 @@ def test_actions_are_drawn_as_in_the_recorded_run() -> None:
     assert [agent.select_action(OBSERVATION, 0.5) for _ in range(100)] == expected
 
 
-def test_gradient_step_of_a_terminated_transition_is_that_computed_by_hand() -> None:
-    agent = linear_agent()
-    (loss,) = agent.update(one_transition(action=1, reward=-3, terminated=True))
-    # Q - target is 0 + 3. The mean is over two outputs, so the slope is 2 * 3 / 2.
-    assert loss == pytest.approx(3**2 / 2)
+@pytest.mark.parametrize(
+    ("loss", "reward", "terminated", "value", "slope"),
+    [
+        # Q - target is 0 + 3. The mean is over two outputs, so the slope is 2 * 3 / 2.
+        (mean_squared_error, -3, True, 3**2 / 2, 3.0),
+        # The target is -1 + 0.5 * max(1, 0), and the value that it bootstraps from stays.
+        (mean_squared_error, -1, False, 0.5**2 / 2, 0.5),
+        (huber, -3, True, 3 - 0.5, 1.0),
+    ],
+)
+def test_gradient_step_is_that_computed_by_hand(
+    loss: Callable[..., tf.Tensor], reward: float, terminated: bool, value: float, slope: float
+) -> None:
+    agent = linear_agent(loss=loss)
+    (found,) = agent.update(one_transition(1, reward, terminated))
+    assert found == pytest.approx(value)
     kernel, bias = agent.online.get_weights()
-    np.testing.assert_allclose(kernel, [[0, -0.3], [0, -0.6], [0, 0.0]], rtol=1e-6)
-    np.testing.assert_allclose(bias, [1, -0.3], rtol=1e-6)
-
-
-def test_gradient_step_does_not_change_the_value_that_it_bootstraps_from() -> None:
-    agent = linear_agent()
-    (loss,) = agent.update(one_transition(action=1, reward=-1, terminated=False))
-    # The target is -1 + 0.5 * max(1, 0), and Q is 0.
-    assert loss == pytest.approx(0.5**2 / 2)
-    kernel, bias = agent.online.get_weights()
-    np.testing.assert_allclose(kernel, [[0, -0.05], [0, -0.1], [0, 0.0]], rtol=1e-6)
-    np.testing.assert_allclose(bias, [1, -0.05], rtol=1e-6)
-
-
-def test_gradient_step_minimizes_the_given_loss() -> None:
-    agent = linear_agent(loss=huber)
-    (loss,) = agent.update(one_transition(action=1, reward=-3, terminated=True))
-    assert loss == pytest.approx(3 - 0.5)
-    np.testing.assert_allclose(agent.online.get_weights()[1], [1, -0.1], rtol=1e-6)
+    step = 0.1 * slope
+    np.testing.assert_allclose(kernel, [[0, -step], [0, -2 * step], [0, 0.0]], rtol=1e-6)
+    np.testing.assert_allclose(bias, [1, -step], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("rule", "next_value"), [(q_learning, 5.0), (double_q_learning, 2.0)])
