@@ -179,6 +179,15 @@ def refusal(
     return error_line
 
 
+@pytest.fixture(scope="module")
+def no_picture() -> Iterator[None]:
+    """Draws nothing after a run, which takes a second: its picture is a few bytes."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
+        patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
+        yield
+
+
 def command_line(name: str, *arguments: str | os.PathLike[str]) -> Sequence[str]:
     """Returns the words that start a command of the package in this interpreter."""
     return [sys.executable, "-m", f"keras_pendulum.{name}", *map(str, arguments)]

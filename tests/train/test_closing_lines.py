@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from pathlib import Path
 from typing import Any
@@ -147,7 +146,7 @@ def test_evaluations_are_summed_up(tmp_path: Path) -> None:
 
 
 def test_finished_run_that_is_resumed_says_how_to_extend_it(
-    in_process: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    in_process: Command, no_picture: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(evaluations, "SEEDS", range(900, 902))
     words = ["--preset", "original", "--hidden-units", "8", "--episodes", "3", "--out", "my run"]
@@ -171,11 +170,3 @@ def test_finished_run_that_is_resumed_says_how_to_extend_it(
     assert extended.stdout.startswith("Episode: 3, ")
     assert "Trained 6 episodes" in extended.stdout
     assert "Greedy policy after episode 5: regret " in extended.stdout
-
-
-def test_untrained_run_says_so_at_its_end(in_process: Command) -> None:
-    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--quiet"]
-    lines = in_process("train", *words).stdout.splitlines()
-    (line,) = (line for line in lines if "learned nothing" in line)
-    assert "--warmup-episodes (now 41)" in line
-    assert not math.isnan(float(lines[lines.index(line) - 1].rsplit(" ", 1)[1]))

@@ -118,32 +118,18 @@ def test_loss_that_is_not_finite_is_refused_after_finite_ones(loss: float) -> No
         run.train()
 
 
-def test_original_makes_459_updates_in_500_episodes() -> None:
-    run = trained("original", max_episode_steps=2)
-    assert updates(run) == [0] * 41 + [1] * 459
-    assert int(run.agent.optimizer.iterations) == 459
-    assert [math.isnan(record.loss) for record in run.history] == [True] * 41 + [False] * 459
-
-
-@pytest.mark.parametrize("warmup", [0, 1, 2])
-def test_updates_begin_after_the_warmup_with_every_stored_transition(warmup: int) -> None:
+def test_updates_begin_after_the_warmup_with_every_stored_transition() -> None:
     # The largest batch that the Config allows.
     run = trained(
         "reference",
         episodes=4,
-        warmup_episodes=warmup,
+        warmup_episodes=2,
         max_episode_steps=5,
-        batch_size=5 * (warmup + 1),
+        batch_size=15,
         updates_per_episode=3,
     )
-    assert updates(run) == [0] * warmup + [3] * (4 - warmup)
+    assert updates(run) == [0, 0, 3, 3]
     assert run.history[-1].updates == run.config.total_updates
-
-
-def test_train_frequency_step_makes_one_update_for_each_step_from_the_first_full_batch() -> None:
-    run = trained("original", train_frequency="step", episodes=4, max_episode_steps=4, batch_size=6)
-    # Transition 6 is the second of episode 1. The warmup belongs to train_frequency episode.
-    assert updates(run) == [0, 3, 4, 4]
 
 
 def test_cartpole_makes_one_update_for_each_step_from_the_first_full_batch() -> None:
@@ -159,15 +145,6 @@ def test_no_update_is_made_while_the_buffer_has_less_than_a_batch() -> None:
     assert updates(run) == [2 * (record.environment_steps >= 128) for record in run.history]
     assert updates(run)[0] == 0
     assert updates(run)[-1] == 2
-
-
-def test_loss_of_a_record_is_the_mean_of_its_updates(monkeypatch: pytest.MonkeyPatch) -> None:
-    run = make_run(
-        kp.preset("original", hidden_units=(8,), episodes=1, warmup_episodes=0, batch_size=3)
-    )
-    monkeypatch.setattr(run.agent, "update", lambda batches: np.array([1.0, 2.0, 6.0]))
-    (record,) = train_episodes(run)
-    assert (record.loss, record.updates) == (3.0, 3)
 
 
 def test_record_has_the_numbers_of_its_episode() -> None:
@@ -225,23 +202,6 @@ def test_rewards_are_scaled_in_the_buffer_and_not_in_the_records() -> None:
     assert scaled.history[0].episode_return == plain.history[0].episode_return
 
 
-def test_another_seed_starts_in_another_state() -> None:
-    first, second = (
-        trained("original", seed=seed, episodes=1, max_episode_steps=1) for seed in (0, 1)
-    )
-    assert (stored(first).observation != stored(second).observation).all()
-
-
-def test_loss_that_is_not_finite_stops_the_run() -> None:
-    initial = kp.DQN((8,))
-    initial.head.bias.assign(np.full(41, 1e25))  # its square is beyond float32
-    run = make_run(kp.preset("original", hidden_units=(8,), episodes=60), initial)
-    message = r"^episode 41, step 200: the loss is inf, learning has diverged; try a smaller "
-    with pytest.raises(kp.UserError, match=message):
-        list(train_episodes(run))
-    assert len(run.history) == 41
-
-
 @pytest.mark.parametrize("name", ["original", "cartpole-original"])
 @pytest.mark.parametrize("broken", ["observation", "reward"])
 def test_number_that_is_not_finite_stops_the_run_at_its_step(
@@ -269,11 +229,8 @@ def test_number_that_is_not_finite_stops_the_run_at_its_step(
 
 
 def test_last_episode_replaces_the_weights_by_their_average() -> None:
-    run = make_run(
-        kp.preset(
-            "reference", hidden_units=(8,), episodes=43, updates_per_episode=2, average_updates=4
-        )
-    )
+    settings = {"hidden_units": (8,), "episodes": 3, "warmup_episodes": 1}
+    run = make_run(kp.preset("reference", updates_per_episode=2, average_updates=4, **settings))
     averages = [
         variable for variable in run.agent.optimizer.variables if variable.path.endswith("_average")
     ]
@@ -286,4 +243,4 @@ def test_last_episode_replaces_the_weights_by_their_average() -> None:
         )
         for _ in train_episodes(run)
     ]
-    assert averaged == [False] * 42 + [True]
+    assert averaged == [False, False, True]
