@@ -14,7 +14,7 @@ from keras_pendulum.config.config import Config
 from keras_pendulum.config.fields import format_value
 from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS
-from keras_pendulum.config.settings import RENAMED, parse_setting
+from keras_pendulum.config.settings import RENAMED
 
 SETTINGS = [spec.name for spec in fields(Config) if spec.name != "preset"]
 
@@ -64,28 +64,10 @@ def test_flags_that_are_not_typed_stay_unset() -> None:
     assert typed() == {}
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "value"),
-    [
-        ("gradient_clip", "none", None),
-        ("gradient_clip", "5", 5.0),
-        ("gravity", "none", None),
-        ("discount", "1e-1", 0.1),
-        ("hidden_units", "16,8", (16, 8)),
-        ("seed", "7", 7),
-        ("loss", "huber", "huber"),
-        ("double_q", "true", True),
-        ("double_q", "false", False),
-    ],
-)
-def test_flag_and_text_give_the_same_value(name: str, text: str, value: object) -> None:
-    assert typed(flag(name), text) == {name: value}
-    assert parse_setting(name, text) == value
-
-
 def test_switch_without_a_value_is_true() -> None:
     assert typed("--keep-best", "--evaluate-every", "5") == {"keep_best": True, "evaluate_every": 5}
     assert typed("--double-q", "--keep-best", "false") == {"double_q": True, "keep_best": False}
+    assert typed("--double-q", "true") == {"double_q": True}
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -133,45 +115,22 @@ def test_mistyped_flag_is_refused_with_the_similar_one(
         )
 
 
-@pytest.mark.parametrize("name", RENAMED)
-def test_mistyped_old_flag_is_not_refused_with_the_old_one(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert f"did you mean {flag(name)}?" not in error_line(capsys, f"{flag(name)}x", "1")
-
-
 @pytest.mark.parametrize(
-    ("name", "defaults"),
+    ("name", "values", "defaults"),
     [
-        ("episodes", "[reference: 500, cartpole-original: 600]"),
-        ("replay_capacity", "[reference: 14000, original: 8000, cartpole-original: 10000]"),
-        ("gravity", "[reference: 1.0, cartpole-original: none]"),
-        ("hidden_units", "[reference: 512,256,128, cartpole-original: 128,128]"),
-        ("updates_per_episode", "[reference: 40, original: 1]"),
-        ("target_update", "[reference: soft, original: none]"),
-        ("double_q", "[reference: false]"),
-        ("seed", "[reference: 0]"),
+        ("episodes", "N", "[reference: 500, cartpole-original: 600]"),
+        ("replay_capacity", "N", "[reference: 14000, original: 8000, cartpole-original: 10000]"),
+        ("gravity", "N", "[reference: 1.0, cartpole-original: none]"),
+        ("hidden_units", "N", "[reference: 512,256,128, cartpole-original: 128,128]"),
+        ("loss", "{squared,huber}", "[reference: squared, cartpole-original: huber]"),
+        ("double_q", "[{true,false}]", "[reference: false]"),
     ],
 )
-def test_help_shows_the_defaults_of_the_reference_and_of_the_originals(
-    name: str, defaults: str, help_lines: dict[str, str]
-) -> None:
-    assert help_lines[flag(name)].endswith(f" {defaults}")
-
-
-@pytest.mark.parametrize(
-    ("name", "values"),
-    [
-        ("loss", "{squared,huber}"),
-        ("double_q", "[{true,false}]"),
-        ("episodes", "N"),
-        ("hidden_units", "N"),
-    ],
-)
-def test_help_shows_the_values_of_a_setting(
-    name: str, values: str, help_lines: dict[str, str]
+def test_help_shows_the_values_and_the_defaults_of_the_reference_and_of_the_originals(
+    name: str, values: str, defaults: str, help_lines: dict[str, str]
 ) -> None:
     assert help_lines[flag(name)].split()[1] == values
+    assert help_lines[flag(name)].endswith(f" {defaults}")
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -181,9 +140,3 @@ def test_help_of_every_setting_has_its_text_and_the_default(
     line = help_lines[flag(name)]
     assert Config.__dataclass_fields__[name].metadata["help"] in line
     assert f"[reference: {format_value(getattr(PRESETS['reference'], name))}" in line
-
-
-def test_help_says_when_a_setting_has_an_effect(help_lines: dict[str, str]) -> None:
-    assert "; only with target_update soft [" in help_lines["--tau"]
-    assert "; only with evaluate_every above 0 [" in help_lines["--keep-best"]
-    assert "; only with environment Pendulum-v1, else none [" in help_lines["--gravity"]

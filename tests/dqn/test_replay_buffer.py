@@ -47,21 +47,6 @@ def test_fields_have_the_dtypes_of_the_update() -> None:
     ]
 
 
-@pytest.mark.parametrize(("batch_size", "batches"), [(1, 1), (4, 1), (2, 3), (10, 5)])
-def test_sample_has_a_row_for_each_batch(batch_size: int, batches: int) -> None:
-    sample = filled(10, 10).sample(batch_size, random.Random(0), batches)
-    shape = (batches, batch_size)
-    assert [array.shape for array in sample] == [(*shape, 3), shape, shape, (*shape, 3), shape]
-
-
-def test_observations_have_the_size_of_the_buffer() -> None:
-    replay = ReplayBuffer(3, observation_size=4)
-    replay.add([1, 2, 3, 4], 1, 1.0, [5, 6, 7, 8], True)
-    sample = replay.sample(1, random.Random(0))
-    np.testing.assert_array_equal(sample.observation, [[[1, 2, 3, 4]]])
-    np.testing.assert_array_equal(sample.next_observation, [[[5, 6, 7, 8]]])
-
-
 @pytest.mark.parametrize("count", [7, 10, 13, 20, 25])
 def test_batches_are_the_draws_of_the_recorded_run(count: int) -> None:
     # Position 0 is the oldest transition, also where the ring has wrapped round.
@@ -119,11 +104,6 @@ def test_get_state_is_a_copy() -> None:
     replay.add([9, 9, 9], 9, 9.0, [9, 9, 9], True)
     assert state.pop("added") == 4
     assert_transitions(Transitions(**state), range(4))
-
-
-def test_transition_without_one_of_its_fields_is_refused() -> None:
-    with pytest.raises(ValueError, match="not enough values"):
-        filled(4, 3).add([1, 2, 3], 0, 1.0, [1, 2, 3])
 
 
 @pytest.mark.parametrize("name", ["added", *Transitions._fields])

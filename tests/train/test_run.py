@@ -14,8 +14,8 @@ import pytest
 import tensorflow as tf
 
 import keras_pendulum as kp
-from keras_pendulum.dqn import target_network
 from keras_pendulum.dqn.losses import huber, mean_squared_error
+from keras_pendulum.dqn.target_network import double_q_learning, q_learning
 from keras_pendulum.environments.actions import DiscreteActions, TorqueGrid, TruncatingTorqueGrid
 from keras_pendulum.train.run import make_optimizer, make_run
 
@@ -23,17 +23,18 @@ pytestmark = pytest.mark.quick
 
 
 @pytest.mark.parametrize(
-    ("name", "actions", "loss", "observation_size"),
+    ("name", "double_q", "actions", "loss", "rule", "observation_size"),
     [
-        ("reference", TorqueGrid, mean_squared_error, 3),
-        ("walkthrough", TruncatingTorqueGrid, mean_squared_error, 3),
-        ("cartpole", DiscreteActions, huber, 4),
+        ("swingup", True, TorqueGrid, mean_squared_error, double_q_learning, 3),
+        ("walkthrough", False, TruncatingTorqueGrid, mean_squared_error, q_learning, 3),
+        ("cartpole", False, DiscreteActions, huber, q_learning, 4),
     ],
 )
 def test_run_has_the_parts_of_its_settings(
-    name: str, actions: type, loss: object, observation_size: int
+    name: str, double_q: bool, actions: type, loss: object, rule: object, observation_size: int
 ) -> None:
-    config = kp.preset(name, seed=5, hidden_units=(8, 4), max_episode_steps=7, replay_capacity=300)
+    sizes = {"hidden_units": (8, 4), "max_episode_steps": 7, "replay_capacity": 300}
+    config = kp.preset(name, seed=5, double_q=double_q, **sizes)
     run = make_run(config)
     assert run.config == config
     assert type(run.actions) is actions
@@ -41,20 +42,14 @@ def test_run_has_the_parts_of_its_settings(
     assert run.agent.online.action_count == run.actions.count
     assert run.agent.online.observation_size == observation_size
     assert (run.agent.loss, run.agent.discount) == (loss, config.discount)
+    assert run.agent.target_rule is rule
+    if config.gravity is not None:
+        assert run.env.get_wrapper_attr("g") == config.gravity
     assert run.agent.rng is run.streams.exploration
     assert (run.replay.capacity, len(run.replay)) == (300, 0)
     assert run.env.get_wrapper_attr("_max_episode_steps") == 7
     assert run.env.render_mode is None
     assert run.history == []
-
-
-@pytest.mark.parametrize(
-    ("double_q", "rule"),
-    [(False, target_network.q_learning), (True, target_network.double_q_learning)],
-)
-def test_agent_has_the_target_rule_of_the_settings(double_q: bool, rule: object) -> None:
-    agent = make_run(kp.preset("reference", double_q=double_q, hidden_units=(8,))).agent
-    assert agent.target_rule is rule
 
 
 @pytest.mark.parametrize(
@@ -92,11 +87,6 @@ def test_epsilon_follows_the_schedule_of_the_settings(
     settings = {"epsilon_start": 0.8, "epsilon_min": 0.1, **settings}
     epsilon = make_run(kp.preset("reference", hidden_units=(8,), **settings)).epsilon
     assert [epsilon(0, 0), epsilon(3, 7)] == pytest.approx(values)
-
-
-def test_gravity_reaches_the_environment() -> None:
-    simulation: Any = make_run(kp.preset("swingup", hidden_units=(8,))).env.unwrapped
-    assert simulation.g == 10.0
 
 
 @pytest.mark.parametrize(
