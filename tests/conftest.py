@@ -183,6 +183,10 @@ def refusal(
 def no_picture() -> Iterator[None]:
     """Draws nothing after a run, which takes a second: its picture is a few bytes."""
     with pytest.MonkeyPatch.context() as patched:
+        # The optimum of another number of steps takes many seconds.
+        patched.setattr(
+            "keras_pendulum.train.reference_returns.reference_returns", lambda config: {}
+        )
         patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
         patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
         yield
