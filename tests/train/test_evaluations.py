@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Command, assert_same
+from short_runs import SHORT, KilledError, kill_at_call
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
@@ -19,22 +20,20 @@ from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.solution import USUAL_SEEDS
 from keras_pendulum.storage.run_folder import RunFolder, find_run
-from keras_pendulum.train import evaluations
+from keras_pendulum.train import evaluations, train_dqn
 from keras_pendulum.train.checkpoint import load_checkpoint
 from keras_pendulum.train.folder_files import BestWeightsFile
 from keras_pendulum.train.run import Run
 
-SMALL: dict[str, Any] = {"hidden_units": (8,), "warmup_episodes": 2}
 FEW_STARTS = range(900, 903)
+pytestmark = pytest.mark.usefixtures("few_starts")
 
 
-@pytest.fixture(autouse=True, scope="module")
-def short_runs() -> Iterator[None]:
+@pytest.fixture(scope="module")
+def few_starts(no_picture: None) -> Iterator[None]:
     """Evaluates on few starts and draws nothing."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(evaluations, "SEEDS", FEW_STARTS)
-        patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
-        patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
         yield
 
 
@@ -84,7 +83,7 @@ def test_evaluated_run_equals_a_run_without_evaluations_bit_for_bit(
 ) -> None:
     plain = kp.preset(name, episodes=8, hidden_units=(8,))
     if plain.train_frequency == "episode":
-        plain = plain.change(**SMALL)
+        plain = plain.change(batch_size=32, **SHORT)
     config = replace(plain, evaluate_every=3, keep_best=True)
     runs: list[Run] = []
     for settings, folder in ((plain, tmp_path / "plain"), (config, tmp_path / "evaluated")):
@@ -115,7 +114,7 @@ def test_evaluated_run_equals_a_run_without_evaluations_bit_for_bit(
 
 @pytest.mark.parametrize("name", ["reference", "cartpole"])
 def test_regret_is_that_of_evaluate_policy_on_the_same_starts(name: str) -> None:
-    result = kp.train_dqn(kp.preset(name, episodes=4, evaluate_every=2, **SMALL))
+    result = kp.train_dqn(kp.preset(name, episodes=4, evaluate_every=2, **SHORT))
     score = kp.evaluate_policy(result.network, len(FEW_STARTS), FEW_STARTS.start)
     assert list(evaluated(result.history)) == [1, 3]
     assert result.history[3].greedy_regret == score.regret
@@ -129,7 +128,7 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
 
 
 def test_history_has_the_regrets_of_evaluated_runs_only(tmp_path: Path) -> None:
-    config = kp.preset("original", episodes=3, hidden_units=(8,))
+    config = kp.preset("original", episodes=3, **SHORT)
     kp.train_dqn(config, tmp_path)
     assert "greedy_regret" not in rows_of(tmp_path)[0]
     longer = replace(config, episodes=6, evaluate_every=2)
@@ -150,7 +149,7 @@ def test_best_weights_are_kept_beside_the_last(
     tmp_path: Path, regrets: Callable[..., list[list[Any]]]
 ) -> None:
     weights = regrets(9.0, 5.0, 7.0, 5.0, 6.0)
-    config = kp.preset("reference", episodes=5, evaluate_every=1, keep_best=True, **SMALL)
+    config = kp.preset("reference", episodes=5, evaluate_every=1, keep_best=True, **SHORT)
     result = kp.train_dqn(config, tmp_path)
     best = tmp_path / "pendulum_weight_best.h5"
     assert_weights(best, weights[3])  # the later of two equals
@@ -161,67 +160,33 @@ def test_best_weights_are_kept_beside_the_last(
         load_checkpoint(best, config)
 
 
-@pytest.mark.parametrize(
-    ("environment", "name"),
-    [("original", "pendulum_weight_best.h5"), ("cartpole", "cartpole_weight_best.h5")],
-)
-def test_best_weights_of_another_run_are_removed(
-    environment: str, name: str, tmp_path: Path
-) -> None:
-    (tmp_path / name).touch()
-    config = kp.preset("original", episodes=1, hidden_units=(8,))
-    with pytest.raises(kp.UserError, match=rf"already holds a run \({name}\)"):
-        kp.train_dqn(config, tmp_path)
-    kp.train_dqn(config, tmp_path, overwrite=True)
-    assert not (tmp_path / name).exists()
-
-
-class KilledError(Exception):
-    pass
-
-
-def killed_in(function: Callable[..., Any], call: int) -> Callable[..., Any]:
-    """Returns the function; its given call ends the run."""
-    calls: Iterator[int] = iter(range(1, 100))
-
-    def wrapped(*arguments: Any) -> Any:
-        if next(calls) == call:
-            raise KilledError
-        return function(*arguments)
-
-    return wrapped
+# What ends the run: an evaluation, the row of an episode, and the second of the best weights,
+# after the checkpoint.
+KILLS: dict[str, tuple[Any, str, int]] = {
+    "in an evaluation": (train_dqn, "greedy_regret", 8),
+    "between two episodes": (RunFolder, "append", 10),
+    "after the checkpoint": (BestWeightsFile, "_write", 2),
+}
 
 
 def kill(place: str, patched: pytest.MonkeyPatch) -> None:
     """Makes the next run end after some of its evaluations."""
-    if place == "in an evaluation":
-        due = killed_in(evaluations.greedy_regret, 8)
-        patched.setattr("keras_pendulum.train.train_dqn.greedy_regret", due)
-    elif place == "between two episodes":
-        patched.setattr(RunFolder, "append", killed_in(RunFolder.append, 10))
-    else:
-        write = killed_in(BestWeightsFile._write, 2)
-        patched.setattr(BestWeightsFile, "_write", lambda *arguments: write(*arguments))
+    kill_at_call(*KILLS[place], patched)
 
 
 @pytest.fixture(scope="module")
 def whole_run(
-    short_runs: None, tmp_path_factory: pytest.TempPathFactory
+    few_starts: None, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Config, kp.TrainingResult, Path]:
     """A run that keeps its best weights and is not interrupted, and its folder."""
     config = kp.preset(
-        "reference", episodes=12, evaluate_every=2, keep_best=True, save_every=5, **SMALL
+        "reference", episodes=12, evaluate_every=2, keep_best=True, save_every=5, **SHORT
     )
     folder = tmp_path_factory.mktemp("whole")
     return config, kp.train_dqn(config, folder), folder
 
 
-AFTER_THE_CHECKPOINT = "between the checkpoint and the best weights"
-
-
-@pytest.mark.parametrize(
-    "place", ["in an evaluation", "between two episodes", AFTER_THE_CHECKPOINT]
-)
+@pytest.mark.parametrize("place", KILLS)
 def test_killed_and_resumed_run_keeps_the_best_weights(
     place: str,
     whole_run: tuple[Config, kp.TrainingResult, Path],
@@ -244,9 +209,9 @@ def test_run_killed_before_its_best_weights_are_written_writes_them_when_resumed
     tmp_path: Path, regrets: Callable[..., list[list[Any]]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     weights = regrets(9.0, 5.0, 7.0)
-    config = kp.preset("reference", episodes=3, evaluate_every=1, keep_best=True, **SMALL)
+    config = kp.preset("reference", episodes=3, evaluate_every=1, keep_best=True, **SHORT)
     with monkeypatch.context() as patched:
-        kill(AFTER_THE_CHECKPOINT, patched)
+        kill("after the checkpoint", patched)
         with pytest.raises(KilledError):
             kp.train_dqn(config, tmp_path)
     assert_weights(tmp_path / "pendulum_weight_best.h5", weights[0])
@@ -259,7 +224,7 @@ def test_run_that_asks_later_for_its_best_weights_begins_with_its_last_evaluatio
     tmp_path: Path, regrets: Callable[..., list[list[Any]]]
 ) -> None:
     weights = regrets(1.0, 3.0, 4.0, 2.0)
-    config = kp.preset("reference", episodes=2, evaluate_every=1, **SMALL)
+    config = kp.preset("reference", episodes=2, evaluate_every=1, **SHORT)
     kp.train_dqn(config, tmp_path)
     best = tmp_path / "pendulum_weight_best.h5"
     assert not best.exists()
@@ -270,37 +235,9 @@ def test_run_that_asks_later_for_its_best_weights_begins_with_its_last_evaluatio
     assert_weights(best, weights[3])
 
 
-@pytest.mark.parametrize("content", ["damaged", "weights alone", "of another run"])
-def test_other_file_in_place_of_the_best_weights_stops_a_resumed_run(
-    content: str, tmp_path: Path
-) -> None:
-    config = kp.preset("original", episodes=2, evaluate_every=1, keep_best=True, **SMALL)
-    kp.train_dqn(config, tmp_path / "run")
-    best = tmp_path / "run" / "pendulum_weight_best.h5"
-    if content == "damaged":
-        best.write_bytes(b"damaged")
-    elif content == "weights alone":
-        kp.save_weights(kp.DQN((8,)), best)
-    else:
-        kp.train_dqn(replace(config, seed=1), tmp_path / "other")
-        (tmp_path / "other" / best.name).replace(best)
-    before = {file: file.read_bytes() for file in best.parent.iterdir()}
-    message = "not an HDF5 file" if content == "damaged" else "not those of an evaluation of this"
-    with pytest.raises(kp.WeightsError, match=message) as caught:
-        kp.train_dqn(config, tmp_path / "run", resume=True)
-    assert "\n" not in str(caught.value)
-    assert {file: file.read_bytes() for file in best.parent.iterdir()} == before
-
-
-def test_best_weights_need_a_folder() -> None:
-    config = kp.preset("original", episodes=2, evaluate_every=1, keep_best=True, **SMALL)
-    with pytest.raises(kp.UserError, match="keep_best needs `out`"):
-        kp.train_dqn(config)
-
-
 def test_phases_are_announced_before_they_begin(tmp_path: Path) -> None:
     events: list[object] = []
-    config = kp.preset("reference", episodes=5, evaluate_every=2, **SMALL)
+    config = kp.preset("reference", episodes=5, evaluate_every=2, **SHORT)
     kp.train_dqn(
         config,
         tmp_path,
