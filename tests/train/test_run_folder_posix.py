@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from short_runs import SHORT, contents
 
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
@@ -20,10 +21,12 @@ from keras_pendulum.train.checkpoint import load_checkpoint
 if sys.platform == "win32":
     pytest.skip("needs links, pipes and moved folders", allow_module_level=True)
 
+pytestmark = pytest.mark.usefixtures("no_picture")
+
 
 @pytest.mark.parametrize("name", ["pendulum_weight.h5", "cartpole_weight.h5", "history.csv"])
 def test_run_does_not_write_through_a_link(name: str, tmp_path: Path) -> None:
-    config = kp.preset("original", episodes=2, hidden_units=(8,))
+    config = kp.preset("original", episodes=2, **SHORT)
     kp.train_dqn(config, tmp_path / "run")
     target = tmp_path / "of another run"
     target.write_bytes(b"unchanged")
@@ -45,9 +48,9 @@ def test_pipe_in_place_of_a_file_of_the_run_is_refused(tmp_path: Path) -> None:
 
 def test_link_changed_during_a_run_does_not_change_its_folder(tmp_path: Path) -> None:
     best, new, latest = (tmp_path / name for name in ("best", "new", "latest"))
-    config = kp.preset("original", episodes=12, hidden_units=(8,))
+    config = kp.preset("original", episodes=12, **SHORT)
     kp.train_dqn(replace(config, seed=7), best)
-    before = {file: file.read_bytes() for file in best.iterdir()}
+    before = contents(best)
     new.mkdir()
     latest.symlink_to(new)
 
@@ -57,7 +60,7 @@ def test_link_changed_during_a_run_does_not_change_its_folder(tmp_path: Path) ->
             latest.symlink_to(best)
 
     kp.train_dqn(config, latest, listeners=[change_link])
-    assert {file: file.read_bytes() for file in best.iterdir()} == before
+    assert contents(best) == before
     assert len(load_checkpoint(new / "pendulum_weight.h5", config).history) == 12
 
 
@@ -66,7 +69,7 @@ def test_run_ends_when_its_folder_is_moved_and_does_not_write_in_the_new_one(
     writing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder, moved = tmp_path / "run", tmp_path / "moved"
-    config = kp.preset("original", episodes=12, hidden_units=(8,))
+    config = kp.preset("original", episodes=12, **SHORT)
     before: dict[Path, bytes] = {}
     write_started, folder_moved = threading.Event(), threading.Event()
     is_first = iter([True])
@@ -82,12 +85,12 @@ def test_run_ends_when_its_folder_is_moved_and_does_not_write_in_the_new_one(
             assert write_started.wait(60)
             folder.rename(moved)
             kp.train_dqn(replace(config, seed=7), folder)
-            before.update({file: file.read_bytes() for file in folder.iterdir()})
+            before.update(contents(folder))
             folder_moved.set()
 
     monkeypatch.setattr("keras_pendulum.storage.checksum.write_atomically", write)
     with pytest.raises(kp.UserError, match=r"run, or the file .lock in it, was moved, removed"):
         kp.train_dqn(config, folder, listeners=[move])
     assert len(before) == 4
-    assert {file: file.read_bytes() for file in folder.iterdir()} == before
+    assert contents(folder) == before
     assert load_checkpoint(moved / "pendulum_weight.h5", config).config == config

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import Command, assert_same
+from short_runs import SHORT, KilledError, kill_at_call
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
@@ -21,18 +21,10 @@ from keras_pendulum.storage.snapshots import Snapshot, read_snapshots
 from keras_pendulum.train.folder_files import SnapshotsFile, due_episodes
 
 FILE = "pendulum_weight_snapshots.h5"
-CONFIG = kp.preset(
-    "reference", episodes=12, snapshots=5, save_every=5, hidden_units=(8,), warmup_episodes=2
-)
+CONFIG = kp.preset("reference", episodes=12, snapshots=5, save_every=5, **SHORT)
 
 
-@pytest.fixture(autouse=True, scope="module")
-def no_picture() -> Iterator[None]:
-    """Draws nothing."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
-        patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
-        yield
+pytestmark = pytest.mark.usefixtures("no_picture")
 
 
 @pytest.fixture(scope="module")
@@ -83,33 +75,14 @@ def test_snapshots_change_nothing_in_the_run(
     assert_same(kp.train_dqn(replace(CONFIG, snapshots=0)), whole_run[0])
 
 
-class KilledError(Exception):
-    pass
-
-
-def killed_in(function: Callable[..., Any], call: int) -> Callable[..., Any]:
-    """Returns the function; its given call ends the run."""
-    calls = iter(range(1, 100))
-
-    def wrapped(*arguments: Any) -> Any:
-        if next(calls) == call:
-            raise KilledError
-        return function(*arguments)
-
-    return wrapped
-
-
 @pytest.mark.parametrize(
     ("owner", "name", "call"),
     [
         (RunFolder, "append", 5),  # after the snapshot of episode 3, before a checkpoint
         (RunFolder, "append", 11),
         (SnapshotsFile, "_take_if_due", 1),  # before the initial network is kept
-        (
-            SnapshotsFile,
-            "_take_if_due",
-            7,
-        ),  # before the snapshot after 6 episodes, with its checkpoint
+        # Before the snapshot after 6 episodes, with its checkpoint.
+        (SnapshotsFile, "_take_if_due", 7),
     ],
 )
 def test_killed_and_resumed_run_leaves_the_same_file(
@@ -121,8 +94,7 @@ def test_killed_and_resumed_run_leaves_the_same_file(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     with monkeypatch.context() as patched:
-        wrapped = killed_in(getattr(owner, name), call)
-        patched.setattr(owner, name, lambda *arguments: wrapped(*arguments))
+        kill_at_call(owner, name, call, patched)
         with pytest.raises(KilledError):
             kp.train_dqn(CONFIG, tmp_path)
     resumed = kp.train_dqn(replace(CONFIG, save_every=1), tmp_path, resume=True)
@@ -148,50 +120,6 @@ def test_run_that_asks_later_for_snapshots_begins_with_its_present_network(tmp_p
     assert not (tmp_path / FILE).exists()
     kp.train_dqn(replace(config, episodes=4, snapshots=3), tmp_path, resume=True)
     assert [each.episodes for each in snapshots_in(tmp_path)] == [2, 4]
-
-
-@pytest.mark.parametrize("content", ["damaged", "weights alone", "of another run", "other sizes"])
-def test_other_file_in_place_of_the_snapshots_stops_a_resumed_run(
-    content: str, tmp_path: Path
-) -> None:
-    config = replace(CONFIG, episodes=2, snapshots=2, warmup_episodes=41)
-    kp.train_dqn(config, tmp_path / "run")
-    path = tmp_path / "run" / FILE
-    message = {
-        "damaged": "not an HDF5 file",
-        "weights alone": r"holds no snapshots of a run \(train --snapshots N\)",
-        "of another run": "its snapshots are of another run; move it to another folder",
-        "other sizes": "its snapshots have wrong types, sizes or episodes",
-    }[content]
-    if content == "damaged":
-        path.write_bytes(b"damaged")
-    elif content == "weights alone":
-        kp.save_weights(kp.DQN((8,)), path)
-    else:
-        other: dict[str, Any] = {"seed": 1} if content == "of another run" else {}
-        other = other or {"hidden_units": (9,)}
-        kp.train_dqn(replace(config, **other), tmp_path / "other")
-        (tmp_path / "other" / FILE).replace(path)
-    before = {file: file.read_bytes() for file in path.parent.iterdir()}
-    with pytest.raises(kp.WeightsError, match=message) as caught:
-        kp.train_dqn(config, tmp_path / "run", resume=True)
-    assert "\n" not in str(caught.value)
-    assert {file: file.read_bytes() for file in path.parent.iterdir()} == before
-
-
-@pytest.mark.parametrize("name", [FILE, "cartpole_weight_snapshots.h5"])
-def test_snapshots_of_another_run_are_removed(name: str, tmp_path: Path) -> None:
-    (tmp_path / name).touch()
-    config = replace(CONFIG, episodes=1, snapshots=0)
-    with pytest.raises(kp.UserError, match=rf"already holds a run \({name}\)"):
-        kp.train_dqn(config, tmp_path)
-    kp.train_dqn(config, tmp_path, overwrite=True)
-    assert not (tmp_path / name).exists()
-
-
-def test_snapshots_need_a_folder() -> None:
-    with pytest.raises(kp.UserError, match="snapshots needs `out`"):
-        kp.train_dqn(CONFIG)
 
 
 def test_command_keeps_snapshots_and_names_their_page(in_process: Command, tmp_path: Path) -> None:
