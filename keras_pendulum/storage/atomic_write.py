@@ -94,6 +94,8 @@ def _flush_folder(folder: Path) -> None:
 def require_no_other_file(path: Path, beginning: bytes, kind: str, offset: int = 0) -> None:
     """Raises UserError when `path` exists and its content does not start with `beginning`.
 
+    Raises it for a path in a folder that does not exist, too.
+
     A wrong completion in the shell could otherwise replace the weights by the output of a command.
 
     Args:
@@ -103,6 +105,8 @@ def require_no_other_file(path: Path, beginning: bytes, kind: str, offset: int =
         offset: place of `beginning`, where other bytes are before it.
     """
     try:
+        if not path.parent.is_dir():
+            raise UserError(f"cannot write {path}: there is no folder {path.parent}")
         if path.is_file():
             with open(path, "rb") as file:
                 is_other = file.read(offset + len(beginning))[offset:] != beginning

@@ -82,6 +82,7 @@ def run_all(
             report(f"{job}: repeated after {problem}")
             start(job, attempt + 1)
             continue
+        future.release()  # else Dask makes it again when its worker is lost
         start_waiting()  # before the caller writes this result
         yield FinishedJob(job, reply, problem)
 

@@ -25,6 +25,8 @@ LONG = "n" * 250
         ("evaluate", ("",), "the name of the weights file is empty"),
         ("evaluate", (LONG,), "no such file"),
         ("page", ("reference", "--out", f"{LONG}.html"), "File name too long"),
+        ("evaluate", ("reference", "--gif", "no/a.gif"), "there is no folder no"),
+        ("page", ("reference", "--out", "no/a.html"), "there is no folder no"),
         ("train", ("--init", "cartpole"), "holds a network for CartPole-v1 with the activation"),
         ("study", ("--arm", "A: reference tau=0.1 tau=0.2"), "the arm 'A' sets tau twice"),
     ],
