@@ -20,10 +20,16 @@ def test_citation_has_the_fields_of_its_format_and_the_version() -> None:
     assert citation["cff-version"] == "1.2.0"
     assert citation["authors"] == [{"name": "keras_pendulum maintainers"}]
     assert citation["version"] == kp.__version__
+    assert re.findall(r"^## (.+)$", CHANGELOG, re.MULTILINE)[0] == (
+        f"{kp.__version__} ({citation['date-released']})"
+    )
 
 
-def test_changelog_begins_with_this_version() -> None:
-    assert re.findall(r"^## (.+)$", CHANGELOG, re.MULTILINE)[0] == kp.__version__
+def test_changelog_dates_each_version() -> None:
+    headings = re.findall(r"^## (.+)$", CHANGELOG, re.MULTILINE)
+    dates = [re.fullmatch(r"\d+\.\d+\.\d+ \((\d{4}-\d\d-\d\d)\)", each) for each in headings]
+    assert all(dates)
+    assert headings == sorted(headings, reverse=True)
 
 
 def test_changelog_has_each_renamed_setting() -> None:

@@ -103,6 +103,7 @@ def test_each_worker_has_one_job_at_a_time(client: Client) -> None:
     runs = run_all(client, reply, jobs())
     next(runs)
     assert len(handed_out) == 2
+    assert len(client.futures) == 1  # the finished one is released
     assert len(list(runs)) == 49
 
 
