@@ -56,6 +56,7 @@ def did_you_mean(word: str, names: Iterable[str]) -> str:
     by_lower_case = {name.lower(): name for name in names}
     beginning = word[:_LONGEST].lower()  # a much longer one takes long to compare
     found = [name for name in by_lower_case if len(beginning) > 2 and name.startswith(beginning)]
+    found = sorted(found, key=len)  # the word itself is the first
     found += difflib.get_close_matches(beginning, by_lower_case, 1)
     return f"; did you mean {by_lower_case[found[0]]}?" if found else ""
 

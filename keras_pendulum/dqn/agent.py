@@ -86,12 +86,6 @@ class Agent:
             self.optimizer.finalize_variable_values(self.online.trainable_variables)
             self.policy = greedy_policy(self.online)
 
-    def restart_average(self) -> None:
-        """Lets the moving average, if the optimizer has one, begin with the present weights."""
-        averages = [each for each in self.optimizer.variables if each.path.endswith("_average")]
-        for average, weight in zip(averages, self.online.trainable_variables, strict=False):
-            average.assign(weight)
-
     def get_state(self) -> dict[str, Variables]:
         """Returns copies of the variables of `online`, `target` and `optimizer`."""
         return {

@@ -162,12 +162,14 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
     with report_damage(path):
         weights = [array for layer in layers for array in (layer.kernel, layer.bias)]
         paths = [variable.path for variable in run.agent.online.weights]
+        if config.episodes != stored.episodes and config.average_updates > 1:
+            # The old average belongs to a run of another length.
+            names = [f"{config.optimizer}/{path.replace('/', '_')}_average" for path in paths]
+            agent["optimizer"] |= dict(zip(names, weights, strict=True))
         try:
             run.agent.set_state({"online": dict(zip(paths, weights, strict=True)), **agent})
         except ValueError as error:
             raise WeightsError(f"{os.fsdecode(path)}: cannot be resumed, {error}") from error
-        if config.episodes != stored.episodes:
-            run.agent.restart_average()  # the old one belongs to a run of another length
         run.replay.set_state({"added": state["replay_added"], **replay})
         run.streams.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]

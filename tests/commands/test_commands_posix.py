@@ -44,7 +44,7 @@ def test_train_shows_one_progress_bar_on_a_terminal(tmp_path: Path) -> None:
     shown = bars.split("\r")[1:]
     assert {len(line) for line in shown} == {79}  # a wrapped line is not drawn over
     number = r"-?[\d.e-]+"
-    figures = rf"return {number} regret {number} ε 0.85( loss {number})?( \d+ steps/s)?"
+    figures = rf"return {number} ε 0.85( loss {number})?( \d+ steps/s)?"
     assert re.fullmatch(rf"finished 6/6 ━+ {figures}", shown[-1].rstrip())
     phases = [name for name, _ in itertools.groupby(line.split()[0] for line in shown)]
     assert phases == [*("training", "compiling", "training", "evaluating", "drawing", "finished")]

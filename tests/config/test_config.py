@@ -244,7 +244,7 @@ CONDITIONS: list[tuple[str, Any, str, Any, Any, dict[str, Any]]] = [
     ("epsilon_decay_steps", 5.0, "epsilon_schedule", "steps", "episodes", {}),
     *(
         (name, 5, "train_frequency", "episode", "step", {"learning_rate_schedule": "constant"})
-        for name in ("warmup_episodes", "updates_per_episode")
+        for name in ("warmup_episodes", "updates_per_episode", "average_updates")
     ),
     ("weight_decay", 0.5, "optimizer", "adamw", "adam", {}),
     ("learning_rate_min", 1e-4, "learning_rate_schedule", "cosine", "constant", {}),

@@ -25,12 +25,17 @@ def test_find_weights_returns_a_shipped_file_unless_the_current_folder_has_that_
     (tmp_path / "folder").mkdir()
     with pytest.raises(kp.WeightsError, match=r"folder: a folder; expected .* \(\.h5\)$"):
         kp.find_weights("folder")
-    (tmp_path / "folder" / "pendulum_weight.h5").touch()
-    example = Path("folder", "pendulum_weight.h5")
+    (tmp_path / "folder" / "mine.h5").touch()
+    example = Path("folder", "mine.h5")
     with pytest.raises(
         kp.WeightsError,
         match=re.escape(f"folder: a folder; expected a weights file (.h5), such as {example}"),
     ):
+        kp.find_weights("folder")
+    (tmp_path / "folder" / "pendulum_weight.h5").touch()  # the folder of a run
+    assert kp.find_weights("folder") == Path("folder", "pendulum_weight.h5")
+    (tmp_path / "folder" / "cartpole_weight.h5").touch()
+    with pytest.raises(kp.WeightsError, match="folder: a folder"):
         kp.find_weights("folder")
 
 
@@ -42,7 +47,7 @@ def test_load_weights_takes_a_path_or_a_shipped_name(
     kp.save_weights(kp.DQN((8,)), "cartpole")  # the user's own file comes first
     assert kp.load_weights("cartpole").hidden_units == (8,)
     for wrong in ("nonsense", "", "a\0b", "x" * 999):
-        with pytest.raises(kp.WeightsError, match="expected a weights file"):
+        with pytest.raises(kp.WeightsError, match="weights file"):
             kp.load_weights(wrong)
 
 

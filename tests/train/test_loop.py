@@ -230,7 +230,7 @@ def test_number_that_is_not_finite_stops_the_run_at_its_step(
 
 def test_last_episode_replaces_the_weights_by_their_average() -> None:
     settings = {"hidden_units": (8,), "episodes": 3, "warmup_episodes": 1}
-    run = make_run(kp.preset("reference", updates_per_episode=2, average_updates=4, **settings))
+    run = make_run(kp.preset("reference", updates_per_episode=20, average_updates=4, **settings))
     averages = [
         variable for variable in run.agent.optimizer.variables if variable.path.endswith("_average")
     ]

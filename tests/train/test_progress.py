@@ -52,43 +52,29 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Terminal]:
         monkeypatch.setattr("keras_pendulum.train.progress._SECONDS_BETWEEN_DRAWINGS", 0.0)
         monkeypatch.setenv("TERM", term)
         monkeypatch.setenv("COLUMNS", str(columns))
-        set_optimum(-4.0, monkeypatch)
         return output
 
     return make
 
 
-def set_optimum(optimum: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "keras_pendulum.optimum.pendulum.PendulumSolution.mean_best_return", lambda *_: optimum
-    )
-
-
 @pytest.mark.parametrize(
-    ("episodes", "optimum", "means"),
+    ("episodes", "means"),
     [
-        (range(110), -4.5, ["40 to 49, -44.50, 40.00", "90 to 99, -94.50, 90.00"]),
-        (range(47, 51), -4.0, ["47 to 49, -48.00, 44.00"]),  # a resumed run
-        (range(50), float("nan"), ["40 to 49, -44.50"]),  # the optimum is not known
+        (range(110), ["40 to 49, -44.50", "90 to 99, -94.50"]),
+        (range(47, 51), ["47 to 49, -48.00"]),  # a resumed run
     ],
 )
-def test_every_50_episodes_have_a_line_with_return_and_regret_of_the_last_10(
-    episodes: range,
-    optimum: float,
-    means: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+def test_every_50_episodes_have_a_line_with_the_return_of_the_last_10(
+    episodes: range, means: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    set_optimum(optimum, monkeypatch)
     progress = make_progress(kp.preset("reference"))  # the output is not a terminal
     expected = []
     for episode in episodes:
         progress.on_episode(record(episode, episode_return=-float(episode)))
         expected.append(record(episode).line())
         if episode % 50 == 49:
-            numbers, mean, *regret = means.pop(0).split(", ")
-            line = f"Mean of episodes {numbers}, random actions included: return {mean}"
-            expected.append(", regret ".join([line, *regret]))
+            numbers, mean = means.pop(0).split(", ")
+            expected.append(f"Mean of episodes {numbers}, random actions included: return {mean}")
     assert capsys.readouterr().out.splitlines() == expected
 
 
@@ -107,25 +93,17 @@ def figures(line: str) -> str:
     return line.split(" ", 3)[3]
 
 
-def test_bar_shows_speed_of_the_last_episodes_and_their_regret_where_the_optimum_is_known(
-    terminal: Callable[..., Terminal], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bar_shows_speed_of_the_last_episodes(terminal: Callable[..., Terminal]) -> None:
     output = terminal()
     bar = make_progress(kp.preset("reference", episodes=100))
     for episode in range(13):
         bar.on_episode(record(episode))
     lines = output.lines()
-    mean = sum(i**2 for i in range(4, 14)) / 10
     speed = f"{STEPS / 0.5:.0f} steps/s"
     assert lines[-1].startswith("training 13/100 ━━")
-    assert figures(lines[-1]) == (
-        f"return -169 regret {mean - 4:.4g} ε 0.50 loss 0.1 {speed} 0:44 left"
-    )
-    assert figures(lines[0]) == "return -1 regret -3 ε 0.50 loss 0.1"
-    assert figures(lines[1]) == f"return -4 regret -1.5 ε 0.50 loss 0.1 {speed} 0:49 left"
-    set_optimum(float("nan"), monkeypatch)
-    make_progress(kp.preset("reference", episodes=100)).on_episode(record(0))
-    assert figures(output.lines()[-1]) == "return -1 ε 0.50 loss 0.1"
+    assert figures(lines[-1]) == f"return -169 ε 0.50 loss 0.1 {speed} 0:44 left"
+    assert figures(lines[0]) == "return -1 ε 0.50 loss 0.1"
+    assert figures(lines[1]) == f"return -4 ε 0.50 loss 0.1 {speed} 0:49 left"
 
 
 def test_time_left_is_shown_from_the_second_episode_with_updates(
@@ -218,7 +196,7 @@ def test_narrow_terminal_leaves_out_the_least_important_figures(
         bar.on_episode(record(1, greedy_regret=9.0, episode_return=-1.0))
         _, line = output.lines()
         assert len(line) < columns
-        assert "regret -3 greedy 9 " in line
+        assert "return -1 greedy 9 " in line
         shown.append([name for name in ("return", "ε", "loss", "steps/s", "left") if name in line])
     assert shown == [
         ["return", "ε", "loss", "steps/s", "left"],
