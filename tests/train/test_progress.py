@@ -189,14 +189,14 @@ def test_narrow_terminal_leaves_out_the_least_important_figures(
     terminal: Callable[..., Terminal],
 ) -> None:
     shown = []
-    for columns in (90, 80, 70, 60, 50):
+    for columns in (80, 70, 60, 50, 40):
         output = terminal(columns)
         bar = make_progress(kp.preset("reference", episodes=100))
         bar.on_episode(record(0))
         bar.on_episode(record(1, greedy_regret=9.0, episode_return=-1.0))
         _, line = output.lines()
         assert len(line) < columns
-        assert "return -1 greedy 9 " in line
+        assert "greedy 9 " in line
         shown.append([name for name in ("return", "ε", "loss", "steps/s", "left") if name in line])
     assert shown == [
         ["return", "ε", "loss", "steps/s", "left"],
