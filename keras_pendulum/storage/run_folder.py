@@ -22,6 +22,7 @@ from keras_pendulum.history import EpisodeRecord, csv_header
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.find_weights import checkpoints_in
 from keras_pendulum.storage.folder_lock import lock_folder
+from keras_pendulum.storage.small_files import require_folder, require_regular
 from keras_pendulum.storage.snapshots import snapshots_file
 
 
@@ -32,8 +33,8 @@ class RunFolder:
         path: the folder; it may not exist yet.
         environment: of the run.
 
-    Raises UserError when the folder cannot be read, and when one of the run's files is a link or
-    not a regular file.
+    Raises UserError when the folder cannot be read, and when one of the run's files, or its folder
+    `tensorboard`, is a link or of another kind.
     """
 
     def __init__(self, path: str | os.PathLike[str], environment: str) -> None:
@@ -56,19 +57,11 @@ class RunFolder:
         self._evaluated = False  # whether history.csv has the column of the evaluations
         self.require_not_moved: Callable[[], None] = lambda: None  # see folder_lock.lock_folder
         try:
-            # Through a link, the run would replace a file of another folder.
-            strange = [
-                file.name
-                for file in (*self.files, *self._others)
-                if file.is_symlink() or (file.exists() and not file.is_file())
-            ]
+            # Through a link, the run would replace or remove files of another folder.
+            require_regular(*(self.path / file.name for file in (*self.files, *self._others)))
+            require_folder(self.path / self.events.name)
         except OSError as error:
             raise UserError(f"cannot read the folder {path}: {error.strerror}") from error
-        if strange:
-            raise UserError(
-                f"{self.path / strange[0]} is a link, a folder or a device; a run writes a file "
-                "there: remove it, or name another folder with --out"
-            )
 
     @property
     def files(self) -> list[Path]:

@@ -9,6 +9,8 @@ import json
 from importlib import resources
 from pathlib import Path
 
+from keras_pendulum.storage.small_files import read_small_file
+
 
 def shipped_folder() -> Path:
     """Returns the folder of the files: `shipped_weights` in a wheel, `weights` in a checkout."""
@@ -23,7 +25,8 @@ def shipped_returns() -> dict[str, float]:
     Each file records the same number; `benchmarks.learning.preset_results` writes both.
     """
     try:
-        text = (shipped_folder() / "returns.json").read_text(encoding="utf-8")
+        # Some installers link the files of a package.
+        text = read_small_file((shipped_folder() / "returns.json").resolve())
     except FileNotFoundError:  # a copy of the package alone
         return {}
     returns: dict[str, float] = json.loads(text)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -16,6 +15,7 @@ from keras_pendulum.config.settings import read_settings
 from keras_pendulum.errors import ConfigError, UserError
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.folder_lock import LOCK_FILE, lock_folder
+from keras_pendulum.storage.small_files import read_small_file, require_folder, require_regular
 from keras_pendulum.study.arms import Arm
 from keras_pendulum.study.job import (
     Job,
@@ -58,13 +58,18 @@ class ResultsFolder:
     def require_usable(self) -> None:
         """Raises UserError when the folder holds another study or something else.
 
-        Without its `study.json`, a folder is usable when all its results belong to this study.
+        Without its `study.json`, a folder is usable when all its results belong to this study. A
+        link in place of one of its files or folders is refused.
         """
         with _user_error(f"cannot read the folder {self.path}"):
             try:
                 names = {file.name for file in self._folder.iterdir()} - {LOCK_FILE}
             except FileNotFoundError:
                 return
+            # Through a link, the study would write in another folder.
+            require_regular(self._manifest, self._log)
+            slugs = {arm.slug for arm in self._first_arms.values()}
+            require_folder(self._results, *(self._results / slug for slug in sorted(slugs)))
         if self._manifest.name in names:
             self._require_same_study()
         elif results := sorted(self._results.glob("*/*.json")):
@@ -104,6 +109,8 @@ class ResultsFolder:
 
         Args:
             report: called with a line for each file that holds no valid result.
+
+        Raises UserError for a result that is a link, a device or larger than any result.
         """
         missing = [job for job in self.jobs() if self._read(job) is None]
         for file in map(self._file, missing):
@@ -122,6 +129,9 @@ class ResultsFolder:
                 f"{reply.worker} sent a damaged result of {job}: run the command again to retry it"
             )
         self._require_in_place()
+        with _user_error(f"cannot write in {self.path}"):
+            require_folder(self._results, self._file(job).parent)
+            require_regular(self._file(job), self._log)
         write_atomically(self._file(job), reply.result)
         seconds = (f"{each:.3f}" for each in (reply.training, reply.evaluation, reply.total))
         with (
@@ -136,7 +146,10 @@ class ResultsFolder:
 
     def write(self, name: str, content: bytes) -> None:
         """Writes a table or a figure. Raises UserError when that fails."""
-        write_atomically(self._folder / name, content)
+        file = self._folder / name
+        with _user_error(f"cannot write {file}"):
+            require_regular(file)
+        write_atomically(file, content)
 
     def results(self) -> dict[str, list[RunResult]]:
         """Returns the valid results by the arm's name, in the order of their seeds."""
@@ -158,7 +171,7 @@ class ResultsFolder:
     def _read(self, job: Job) -> RunResult | None:
         with _user_error(f"cannot read {self._file(job)}"):
             try:
-                return decode(self._file(job).read_bytes(), job)
+                return decode(read_small_file(self._file(job)), job)
             except FileNotFoundError:
                 return None
 
@@ -171,13 +184,14 @@ class ResultsFolder:
     def _require_same_study(self) -> None:
         try:
             with _user_error(f"cannot read {self._manifest}"):
-                manifest = json.loads(self._manifest.read_bytes())
-        except ValueError as error:
+                manifest = json.loads(read_small_file(self._manifest))
+        except (ValueError, RecursionError) as error:
             raise UserError(
                 f"{self._manifest} is damaged: remove it and run the same command again, which "
                 "uses the results found; or name another folder with --out"
             ) from error
-        with suppress(AttributeError, KeyError, TypeError, ConfigError):  # of other JSON
+        # Other JSON, perhaps nested deeply.
+        with suppress(AttributeError, KeyError, TypeError, ConfigError, RecursionError):
             require_versions(manifest["versions"], self.versions, f"{self.path}: this machine")
             # Older files also record settings that have no effect.
             arms = [
@@ -195,8 +209,9 @@ class ResultsFolder:
         arms = {arm.slug: arm for arm in self._first_arms.values()}
         for file in files:
             arm = arms.get(file.parent.name)
-            seed = re.search(r"-seed(\d{1,6})$", file.stem)
-            job = self._job(arm, int(seed[1])) if arm and seed else None
+            seed = file.stem.rpartition("-seed")[2]
+            is_number = seed.isascii() and seed.isdigit() and len(seed) <= 6
+            job = self._job(arm, int(seed)) if arm and is_number else None
             if job is None or self._file(job) != file or self._read(job) is None:
                 raise UserError(
                     f"{file} is no result of this study, and study.json is missing: run the "
