@@ -63,10 +63,6 @@ def load_runs(folders: Sequence[RunFolder]) -> list[ComparedRun]:
     for folder, run in zip(folders, runs, strict=True):
         if not run.history:
             raise UserError(f"{folder.path}: its run has no finished episode yet")
-        if not all(
-            math.isfinite(record.average_reward + record.episode_return) for record in run.history
-        ):
-            raise UserError(f"{folder.path}: its history is damaged, a return is not finite")
     scores = [evaluate_policy(load_weights(folder.weights)) for folder in folders]
     names = short_names([folder.path for folder in folders])
     return [

@@ -13,7 +13,7 @@ from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.environments.pendulum import MAX_SPEED
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.dynamics import TIME_STEP
-from keras_pendulum.storage.recorded_run import load_recorded_run, load_transitions
+from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.storage.run_folder import RunFolder
 
 
@@ -23,7 +23,7 @@ def read_record(folder: RunFolder) -> RunRecord:
     Raises WeightsError for a damaged checkpoint, and for one that holds weights without a run.
     """
     run = load_recorded_run(folder.weights)
-    return RunRecord(run.config, run.history, load_transitions(folder.weights))
+    return RunRecord(run.config, run.history, run.replay)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ numbers, and when each layer has as many inputs as the previous one has outputs.
 
 from __future__ import annotations
 
+import os
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from keras_pendulum.storage.model_config import dense_layers
 from keras_pendulum.storage.quarantine import H5File
 
 _LARGEST_LAYER = 8192  # units
+_LARGEST_WEIGHT = 1e6  # those of a network that learned well are below 100
 # Kinds of layers without weights that keep the network a chain of Dense layers.
 _WITHOUT_WEIGHTS = {
     *("input", "input_layer", "flatten", "dropout", "activation"),
@@ -107,7 +109,19 @@ def _read_layer(file: H5File, path: str, stored: StoredLayer, activation: str | 
             f"{path}: layer {stored.name} has {kernel.shape[1]} units; expected 1 to "
             f"{_LARGEST_LAYER}"
         )
+    for array in (kernel, bias):
+        require_sane(array, f"layer {stored.name}", path)
     return Layer(stored.name, kernel.astype(np.float32), bias.astype(np.float32), activation)
+
+
+def require_sane(array: NDArray[Any], name: str, path: str | os.PathLike[str]) -> None:
+    """Raises WeightsError for a weight so large that the network's outputs could overflow."""
+    largest = np.abs(array).max(initial=0)
+    if largest > _LARGEST_WEIGHT:
+        raise WeightsError(
+            f"{os.fsdecode(path)}: {name} has a weight of the size {largest:.3g}; expected at most "
+            f"{_LARGEST_WEIGHT:g}: learning has diverged, or the file is damaged"
+        )
 
 
 def _keras2_layers(file: H5File, path: str, root: str) -> list[StoredLayer]:

@@ -83,7 +83,7 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
         if model and model.get("registered_name") == REGISTERED_NAME:
             config = model["config"]
             attributes = {name: config[name] for name in config if config[name] is not None}
-        info = _run_info(attributes, path)
+        info = read_info(attributes, path)
         task = _task(info)
         layers = read_layers(file, path, task.observation_size, model)
     activation = attributes.get("activation")
@@ -107,7 +107,8 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
     return activation, info, layers
 
 
-def _run_info(attributes: dict[str, Any], path: str) -> RunInfo:
+def read_info(attributes: dict[str, Any], path: str) -> RunInfo:
+    """Returns the run that the attributes of a file record. Raises WeightsError for wrong ones."""
     for name, value in attributes.items():
         if value is None:
             raise WeightsError(f"{path}: the attribute {name} is neither text nor a number")

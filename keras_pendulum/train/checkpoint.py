@@ -16,15 +16,9 @@ from keras_pendulum.config.config import Config
 from keras_pendulum.dqn.agent import Variables
 from keras_pendulum.errors import ConfigError, WeightsError, require_finite
 from keras_pendulum.storage.checksum import write_with_checksum
-from keras_pendulum.storage.keras_h5 import read_layers
+from keras_pendulum.storage.keras_h5 import require_sane
 from keras_pendulum.storage.quarantine import open_h5, report_damage
-from keras_pendulum.storage.recorded_run import (
-    history_arrays,
-    read_arrays,
-    read_config,
-    read_history,
-    read_state,
-)
+from keras_pendulum.storage.recorded_run import history_arrays, read_arrays, read_run
 from keras_pendulum.storage.save_weights import changed_versions, encode_weights
 from keras_pendulum.train.run import Run, make_run
 
@@ -131,27 +125,26 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
         ConfigError: `config` belongs to another run.
     """
     with open_h5(path) as file:
-        state = read_state(file, path)
-        stored = read_config(state, path)
-        for name, old in stored.learning().items():
+        recorded = read_run(file, path)
+        for name, old in recorded.config.learning().items():
             new = getattr(config, name)
             if new != old and name != "episodes":
                 raise ConfigError(
                     f"{path}: this run has {name} {old}, not {new}: resume it without this change, "
                     "or start another run in another folder"
                 )
-        history = read_history(file)
-        if len(history) > config.episodes:
+        episodes = len(recorded.history)
+        if episodes > config.episodes:
             raise ConfigError(
-                f"{path}: this run has {len(history)} episodes already; episodes is "
-                f"{config.episodes}, expected at least {len(history)}"
+                f"{path}: this run has {episodes} episodes already; episodes is "
+                f"{config.episodes}, expected at least {episodes}"
             )
-        layers = read_layers(file, os.fsdecode(path), stored.task.observation_size, None)
         agent = {
             group: {name.replace(".", "/"): array for name, array in read_arrays(file, group)}
             for group in ("target", "optimizer")
         }
-        replay = dict(read_arrays(file, "replay"))
+        for name, array in agent["target"].items():
+            require_sane(array, f"target/{name}", path)
         if versions := changed_versions(file):
             warnings.warn(
                 f"{os.fsdecode(path)} was saved with {', '.join(versions)}; these differ now: "
@@ -160,7 +153,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
             )
     run = make_run(config, render=render)
     with report_damage(path):
-        weights = [array for layer in layers for array in (layer.kernel, layer.bias)]
+        weights = [array for layer in recorded.layers for array in (layer.kernel, layer.bias)]
         paths = [variable.path for variable in run.agent.online.weights]
         if config.episodes != stored.episodes and config.average_updates > 1:
             # The old average belongs to a run of another length.
@@ -170,8 +163,19 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
             run.agent.set_state({"online": dict(zip(paths, weights, strict=True)), **agent})
         except ValueError as error:
             raise WeightsError(f"{os.fsdecode(path)}: cannot be resumed, {error}") from error
-        run.replay.set_state({"added": state["replay_added"], **replay})
+        _check_optimizer(agent["optimizer"], recorded.updates)
+        state = recorded.state
+        run.replay.set_state({"added": state["replay_added"], **recorded.replay._asdict()})
         run.streams.set_state(state["random"])
         run.env.unwrapped.np_random.bit_generator.state = state["environment"]
-        run.history = history
+        run.history = recorded.history
     return run
+
+
+def _check_optimizer(variables: Variables, updates: int) -> None:
+    """Raises ValueError for variables that no optimizer has after so many updates."""
+    for name, array in variables.items():
+        if name.endswith("iteration") and (array.dtype.kind != "i" or (array != updates).any()):
+            raise ValueError(f"optimizer/{name} is {array}; its history has {updates} updates")
+        if not name.endswith(("momentum", "average")) and (array < 0).any():
+            raise ValueError(f"optimizer/{name} is negative")

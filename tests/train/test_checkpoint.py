@@ -215,7 +215,7 @@ CHECKPOINT_DAMAGE: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     ),
     "layers of another size": (
         replace_layers,
-        "online/dqn/head/kernel is missing, unknown or of another shape",
+        "its layers have [9, 41] units; its settings say [8, 41]",
     ),
     "no target": (lambda file: file.__delitem__("target"), "damaged"),
     "target of another shape": (
