@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.errors import UnknownLayersError, UserError, WeightsError, one_line
+from keras_pendulum.errors import UnknownLayersError, UserError, one_line
 from keras_pendulum.evaluate.answers import is_instance
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.q_policies import DQNPolicy, QPolicy
 from keras_pendulum.evaluate.torque_policies import FunctionPolicy, PredictPolicy, has_predict
 from keras_pendulum.storage.find_weights import find_weights
+from keras_pendulum.storage.keras_models import load_keras_model
 from keras_pendulum.storage.load_weights import load_weights
 
 _EXPECTED = (
@@ -91,9 +92,8 @@ def load_keras_file(
     """Returns the network in a file.
 
     A chain of Dense layers is read by `load_weights`, with the same arguments and errors. A whole
-    model with other layers, in a `.keras` file, is read by Keras in its safe mode, which runs no
-    code of the file. Before, the file has passed the checks of `load_weights` up to the kind of its
-    layers. Raises WeightsError when Keras cannot read it.
+    model with other layers, in a `.keras` file, is read by `load_keras_model`, which raises
+    WeightsError for layers that Keras cannot load safely.
     """
     try:
         return load_weights(path, activation)
@@ -101,13 +101,4 @@ def load_keras_file(
         file = find_weights(path)
         if Path(file).suffix.lower() != ".keras":
             raise UnknownLayersError(f"{unknown}; save other models as .keras") from unknown
-        try:
-            model = keras.saving.load_model(file, compile=False, safe_mode=True)
-        except Exception as error:  # which one depends on what the file lacks
-            raise WeightsError(
-                f"{file}: Keras cannot load it ({type(error).__name__}: {error}); for a model with "
-                "code of its own, give file.py:name"
-            ) from error
-    if not isinstance(model, keras.Model):
-        raise WeightsError(f"{file}: holds a {type(model).__name__}; expected a Keras model")
-    return model
+        return load_keras_model(file)

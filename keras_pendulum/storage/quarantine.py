@@ -99,21 +99,23 @@ class H5File:
 
 
 @contextlib.contextmanager
-def open_h5(path: str | os.PathLike[str]) -> Iterator[H5File]:
+def open_h5(path: str | os.PathLike[str], shown: str | None = None) -> Iterator[H5File]:
     """Reads an `.h5` file, or the HDF5 file inside a `.keras` file, for the `with` block.
 
-    The attribute `model_config` of a `.keras` file is its configuration.
+    The attribute `model_config` of a `.keras` file is its configuration. `shown` replaces the path
+    in messages.
 
     Raises WeightsError when the file is missing, a folder, empty, of another kind, damaged, or
     harmful, or when no process can read it; also for damage that is found inside the `with` block.
     """
-    name = os.fsdecode(path)
+    place = os.fsdecode(path)
+    name = place if shown is None else shown
     with report_damage(name), contextlib.ExitStack() as stack:
-        if not Path(name).is_file():
-            found = "not a file" if Path(name).exists() else "no such file"
+        if not Path(place).is_file():
+            found = "not a file" if Path(place).exists() else "no such file"
             raise WeightsError(f"{name}: {found}; expected a weights file (.h5)")
         try:
-            with open(name, "rb") as file:
+            with open(place, "rb") as file:
                 size = _size(file, name)
                 output = stack.enter_context(tempfile.TemporaryFile())
                 _run_reader(file, output, SECONDS + size / 2**25)
