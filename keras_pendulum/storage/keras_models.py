@@ -1,8 +1,8 @@
 """Loads whole models with other layers than Dense from `.keras` files, through Keras.
 
-Keras builds whatever a configuration says: it reads other files, imports packages, allocates any
-size. So the file is read once, and Keras gets the checked bytes. Its layers are on a short list, and
-Keras first builds the model in a TensorFlow graph, which has all sizes and allocates nothing.
+Keras builds whatever a configuration says: it reads other files, imports packages and allocates
+what it says. So the file is read once, and Keras gets the checked bytes. Its layers are on a list,
+and Keras first builds the model in a TensorFlow graph, which has all sizes and allocates nothing.
 """
 
 from __future__ import annotations
@@ -136,7 +136,11 @@ def _require_known_layers(config: dict[str, Any], path: str) -> None:
                 settings = entry.get("config")
                 name = str(settings.get("name", name) if isinstance(settings, dict) else name)
                 if not _is_known(entry):
-                    _refuse(path, f"layer {name} has a {entry['class_name']}")
+                    _refuse(
+                        path,
+                        f"layer {name} has a {entry['class_name']}, expected Keras's own layers of "
+                        "vectors and sequences, such as Dense, Conv1D, LSTM and Add",
+                    )
                 if entry.get("module") in _PLACES_OF_LAYERS | _OPERATIONS:
                     calls = entry.get("inbound_nodes")
                     layers += max(1, len(calls) if isinstance(calls, list) else 0)
@@ -144,7 +148,13 @@ def _require_known_layers(config: dict[str, Any], path: str) -> None:
         elif isinstance(entry, list):
             pending += [(name, value) for value in entry]
         elif isinstance(entry, int) and abs(entry) > _LARGEST_NUMBER:
-            _refuse(path, f"layer {name} has the number {entry:.0e}, more than {_LARGEST_NUMBER}")
+            _refuse(
+                path,
+                f"layer {name} has a number of {len(str(abs(entry)))} digits, more than "
+                f"{_LARGEST_NUMBER}",
+            )
+        elif isinstance(entry, float) and not math.isfinite(entry):
+            _refuse(path, f"layer {name} has the number {entry}")
         elif isinstance(entry, str) and len(entry) > _LONGEST_TEXT:
             _refuse(path, f"layer {name} has a text of {len(entry)} characters")
     if layers > _MOST_LAYERS:
@@ -200,6 +210,5 @@ def _require_sizes(text: str, stored: int, path: str) -> None:
 
 def _refuse(path: str, found: str) -> NoReturn:
     raise UnknownLayersError(
-        f"{path}: Keras cannot load it safely: {found}; expected usual layers of Keras, such as "
-        "Dense, Conv1D, LSTM and Add; for another model, give file.py:name"
+        f"{path}: Keras cannot load it safely: {found}; for such a model, give file.py:name"
     )
