@@ -73,8 +73,11 @@ class RunRecord:
 
         Gravity and torque are those with which the equation of motion best leads from each stored
         observation to the next one. The correlation is 1 in a healthy buffer.
+        Both are 0 where no transition is below the speed limit.
         """
         sine, acceleration, action = self._motion
+        if not len(action):
+            return 0.0, 0.0
         stored = torques[action]
         causes = np.stack([1.5 * sine, 3 * stored], axis=1)
         (gravity, _), *_ = np.linalg.lstsq(causes, acceleration, rcond=None)
@@ -85,12 +88,12 @@ class RunRecord:
         """Returns the actions that acted, but were always stored as one other action.
 
         The equation of motion is exact, so each transition shows which torque acted in it. No
-        action is returned without 200 transitions, for half of the actions or more, and where the
-        torques that acted are not among `torques`.
+        action is returned without 200 transitions below the speed limit, for half of the actions or
+        more, and where the torques that acted are not among `torques`.
         """
-        if len(self.replay.action) < 200:
-            return []
         sine, acceleration, stored = self._motion
+        if len(stored) < 200:
+            return []
         gravity, _ = self.motion_fit(torques)
         for _ in range(3):  # a lost action changes the first fit of the gravity a little
             acted = (acceleration - 1.5 * gravity * sine) / 3

@@ -10,6 +10,8 @@ import os
 import warnings
 from typing import Any
 
+import numpy as np
+
 from keras_pendulum.dqn.network import DQN, REGISTERED_NAME
 from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.pendulum import Pendulum
@@ -21,6 +23,7 @@ from keras_pendulum.storage.model_config import read_model
 from keras_pendulum.storage.quarantine import open_h5
 from keras_pendulum.storage.run_info import RunInfo
 
+_LARGEST_VALUE = 1e36  # less than a float32 can hold
 GROUP = "keras_pendulum"  # a group beside the layers, which Keras ignores
 
 
@@ -96,6 +99,7 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
             raise WeightsError(
                 f"{path}: records the activation {activation!r}; expected {', '.join(ACTIVATIONS)}"
             )
+    _require_moderate_values(layers, activation or "linear", path)
     outputs = layers[-1].bias.shape[0]
     if outputs < 2:
         raise WeightsError(f"{path}: the network has one output; expected one for each action")
@@ -105,6 +109,21 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
             f"{path}: the network has {outputs} outputs; {task.environment} has {actions} actions"
         )
     return activation, info, layers
+
+
+def _require_moderate_values(layers: list[Layer], activation: str, path: str) -> None:
+    """Raises WeightsError for weights with which the numbers of a deep network could overflow."""
+    largest = 100.0  # of an observation
+    names = [*activations_of(activation, len(layers) - 1), "linear"]
+    for layer, name in zip(layers, names, strict=True):
+        gains = np.abs(layer.kernel).sum(axis=0, dtype=np.float64)  # of the units
+        largest = float((gains * largest + np.abs(layer.bias)).max())
+        if largest > _LARGEST_VALUE:
+            raise WeightsError(
+                f"{path}: layer {layer.name} can give {largest:.1g}; expected at most "
+                f"{_LARGEST_VALUE:g}: learning has diverged, or the file is damaged"
+            )
+        largest = min(largest, 1.0) if name == "tanh" else largest
 
 
 def read_info(attributes: dict[str, Any], path: str) -> RunInfo:

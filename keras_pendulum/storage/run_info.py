@@ -31,10 +31,14 @@ class RunInfo:
         """Returns the information that `as_record` gave; other keys are ignored.
 
         Settings that are not a JSON object count as not recorded. Raises ConfigError for an unknown
-        environment, and for a gravity out of range.
+        environment, for a gravity out of range, and for a preset or a seed of another type.
         """
         environment = record.get("environment", Pendulum.environment)
-        if environment not in TASKS:
+        preset, seed = record.get("preset"), record.get("seed")
+        for name, value, kind in (("preset", preset, str), ("seed", seed, int)):
+            if not isinstance(value, kind | None):
+                raise ConfigError(f"records the {name} {value!r}; expected {kind.__name__}")
+        if not isinstance(environment, str) or environment not in TASKS:
             raise ConfigError(
                 f"records the environment {environment!r}; expected {' or '.join(TASKS)}"
             )
@@ -48,8 +52,8 @@ class RunInfo:
             settings = {}
         return cls(
             task,
-            record.get("preset"),
-            int(record["seed"]) if "seed" in record else None,
+            preset,
+            seed,
             settings if isinstance(settings, dict) else {},
         )
 

@@ -35,9 +35,8 @@ def write_sound_model(path: Path) -> Any:
     return model
 
 
-def write_changed(path: Path, change: Change) -> None:
-    """Writes the sound model with a change of its members."""
-    write_sound_model(path)
+def change_members(path: Path, change: Change) -> None:
+    """Changes the members of a `.keras` file."""
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     change(members)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import sys
 import tempfile
 import warnings
@@ -12,7 +11,7 @@ from typing import Any
 import keras
 import numpy as np
 import pytest
-from strange_models import STRANGE, sound_model, write_changed, write_sound_model
+from strange_models import STRANGE, change_members, sound_model, text, write_sound_model
 
 import keras_pendulum as kp
 from keras_pendulum.evaluate.sources import load_keras_file
@@ -43,7 +42,8 @@ def test_strange_model_is_refused_in_one_line(
     kind: str, tmp_path: Path, temporary_folder: Path
 ) -> None:
     change, message = STRANGE[kind]
-    write_changed(tmp_path / "a.keras", change)
+    write_sound_model(tmp_path / "a.keras")
+    change_members(tmp_path / "a.keras", change)
     before = memory()
     with (
         warnings.catch_warnings(action="error", category=RuntimeWarning),
@@ -56,7 +56,11 @@ def test_strange_model_is_refused_in_one_line(
 
 
 def memory() -> float:
-    """Returns the largest memory of this process so far, in MB."""
+    """Returns the largest memory of this process so far, in MB; 0 on Windows."""
+    if sys.platform == "win32":
+        return 0.0
+    import resource
+
     unit = 1e6 if sys.platform == "darwin" else 1e3
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
@@ -87,6 +91,26 @@ def test_file_that_is_replaced_after_its_checks_is_loaded_as_checked(
     assert isinstance(loaded, keras.Model)
     for found, expected in zip(loaded.get_weights(), model.get_weights(), strict=True):
         np.testing.assert_array_equal(found, expected)
+
+
+def test_weights_with_which_a_deep_network_overflows_are_refused(tmp_path: Path) -> None:
+    for activation, loads in (("tanh", True), ("relu", False)):
+        network = kp.DQN((8,) * 7, 5, activation=activation)
+        network.set_weights([np.full(each.shape, 9e5) for each in network.get_weights()])
+        if loads:
+            kp.save_weights(network, tmp_path / "a.h5")
+        else:
+            with pytest.raises(kp.UserError, match=r"layer dense_5 can give .* at most 1e\+36"):
+                kp.save_weights(network, tmp_path / "a.h5")
+
+
+@pytest.mark.parametrize("record", ['"preset": NaN', '"preset": [1]', '"seed": NaN', '"seed": []'])
+def test_record_of_another_type_is_refused(record: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.keras"
+    kp.DQN((8,), 5).save(path)
+    change_members(path, text('"hidden_units"', f'{record}, "hidden_units"'))
+    with pytest.raises(kp.WeightsError, match=r"a\.keras: records the (preset|seed) .*; expected"):
+        kp.load_weights(path)
 
 
 @pytest.mark.parametrize(("value", "loads"), [(1e5, True), (-1e7, False), (3e38, False)])

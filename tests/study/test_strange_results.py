@@ -25,7 +25,7 @@ def sparse(path: Path) -> None:
         file.truncate(3 * 2**30)
 
 
-KINDS: dict[str, tuple[Callable[[Path], None], str]] = {
+KINDS: dict[str, tuple[Callable[[Path], object], str]] = {
     "a pipe": (os.mkfifo, "is a link, a folder or a device"),
     "a folder": (Path.mkdir, "is a link, a folder or a device"),
     "a device": (lambda path: path.symlink_to("/dev/zero"), "is a link, a folder or a device"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -48,7 +49,7 @@ def array(name: str, value: Any, dtype: Any = None) -> Change:
     return change
 
 
-def number(name: str, place: Any, value: float) -> Change:
+def number(name: str, place: Any, value: Any) -> Change:
     """Returns a change of some numbers of an array."""
     return lambda file: file[name].__setitem__(place, value)
 
@@ -188,6 +189,12 @@ def test_sizes_are_compared_before_a_network_is_made(
         kp.train_dqn(config, run, resume=True)
 
 
+def test_speeds_at_the_limit_are_diagnosed_without_a_warning(run: Path) -> None:
+    change_checkpoint(run, number("replay/next_observation", ..., 8))
+    with warnings.catch_warnings(action="error", category=RuntimeWarning):
+        assert kp.diagnose(run).findings[0].name == "misaligned-transitions"
+
+
 def test_run_without_an_episode_is_sound_and_not_compared(
     folder: Path, run: Path, refusal: Refusal
 ) -> None:
@@ -206,8 +213,8 @@ def test_link_called_tensorboard_is_not_followed(run: Path, tmp_path: Path) -> N
     (other / "events.out.tfevents.1.host").touch()
     (run / "tensorboard").symlink_to(other)
     before = (run / "pendulum_weight.h5").read_bytes()
-    for options in ({"overwrite": True}, {"resume": True}):
+    for resume in (False, True):
         with pytest.raises(kp.UserError, match=r"run/tensorboard is a link, .*expected a folder"):
-            kp.train_dqn(CONFIG, run, **options)
+            kp.train_dqn(CONFIG, run, overwrite=not resume, resume=resume)
     assert (other / "events.out.tfevents.1.host").exists()
     assert (run / "pendulum_weight.h5").read_bytes() == before
