@@ -103,8 +103,9 @@ def _unpack(path: str, weights: Path) -> str:
             )
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = [(each.filename, each.file_size) for each in archive.infolist()]
-            for member, size in members:
-                if size > _MEMBERS.get(member, -1) or len(members) != len(_MEMBERS):
+            names = [member for member, _ in members]
+            for member, size in [*members, *((name, 0) for name in _MEMBERS)]:
+                if size > _MEMBERS.get(member, -1) or names.count(member) != 1:
                     raise WeightsError(
                         f"{path}: holds {member} of {size} bytes; expected {', '.join(_MEMBERS)}, "
                         "once and not larger than usual; for another model, give file.py:name"
@@ -138,7 +139,7 @@ def _require_known_layers(config: dict[str, Any], path: str) -> None:
                 if not _is_known(entry):
                     _refuse(
                         path,
-                        f"layer {name} has a {entry['class_name']}, expected Keras's own layers of "
+                        f"layer {name} is a {entry['class_name']}; expected Keras's own layers of "
                         "vectors and sequences, such as Dense, Conv1D, LSTM and Add",
                     )
                 if entry.get("module") in _PLACES_OF_LAYERS | _OPERATIONS:

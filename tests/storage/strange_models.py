@@ -14,7 +14,7 @@ import keras
 import numpy as np
 
 L = keras.layers
-Change = Callable[[dict[str, bytes]], None]  # of the members of the archive
+Change = Callable[[dict[str, bytes]], object]  # of the members of the archive
 
 
 def sound_model() -> Any:
@@ -103,14 +103,14 @@ def doubled(layers: list[Any]) -> None:
 
 
 STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
-    "layer that runs code": (layer("twice", class_name="Lambda"), "twice has a Lambda"),
+    "layer that runs code": (layer("twice", class_name="Lambda"), "twice is a Lambda"),
     "layer that imports PyTorch": (
         layer("twice", class_name="TorchModuleWrapper"),
-        "twice has a TorchModuleWrapper",
+        "twice is a TorchModuleWrapper",
     ),
-    "layer of a user": (layer("twice", registered_name="a>b"), "twice has a RepeatVector"),
-    "layer of another module": (layer("twice", module="os"), "twice has a RepeatVector"),
-    "layer that is a list": (layer("twice", class_name=[1]), r"twice has a \[1\]"),
+    "layer of a user": (layer("twice", registered_name="a>b"), "twice is a RepeatVector"),
+    "layer of another module": (layer("twice", module="os"), "twice is a RepeatVector"),
+    "layer that is a list": (layer("twice", class_name=[1]), r"twice is a \[1\]"),
     "large number": (layer("twice", n=10**8), "twice has a number of 9 digits, more than 8192"),
     "large output": (layer("twice", n=8000), "twice.* makes 48000 numbers"),
     "weights that are not stored": (
@@ -131,7 +131,8 @@ STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
         lambda members: members.update({"config.json": b'{"class_name":' * 90_000}),
         "",
     ),
-    "assets": (lambda members: members.update({"assets/a": b"text"}), "expected config.json"),
+    "assets": (lambda members: members.update({"assets/a": b"text"}), "holds assets/a of 4 bytes"),
+    "no metadata": (lambda members: members.pop("metadata.json"), "holds metadata.json of 0"),
     "bomb": (lambda members: members.update({"metadata.json": bytes(10**7)}), "metadata.json of"),
     "huge weight": (weights(3e38), "has a weight of the size 3e.38; expected at most 1e.06"),
     "NaN": (weights(np.nan), "holds NaN"),
