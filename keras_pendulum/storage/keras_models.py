@@ -51,9 +51,12 @@ _PLACES_OF_LAYERS = {
     *("keras.src.models.functional", "keras.src.models.sequential"),
 }
 # Operations such as Mean, and what layers are made with: none of them runs code or reads files.
-_OPERATIONS = {"keras.src.ops.numpy", "keras.src.ops.nn"}
+_OPERATIONS = {f"keras.src.ops.{module}" for module in ("numpy", "nn", "math", "linalg")}
 _PARTS = {"keras.initializers", "keras.regularizers", "keras.constraints", "keras.dtype_policies"}
-_VALUES = {"__keras_tensor__", "__tensor__", "__numpy__", "__tuple__", "__slice__", "__ellipsis__"}
+_FURTHER = {("keras.src.ops.core", "Cast"), ("keras.random", "SeedGenerator")}
+_VALUES = {"__keras_tensor__", "__tuple__", "__slice__", "__ellipsis__"}
+_ARRAYS = {"__tensor__", "__numpy__"}
+_TYPES = {"float32", "float64", "int32", "int64", "bool"}  # a text could have any length
 _NOT_SIZES = {"seed", "shared_object_id"}
 
 
@@ -145,7 +148,9 @@ def _require_known_layers(config: dict[str, Any], path: str) -> None:
                 if entry.get("module") in _PLACES_OF_LAYERS | _OPERATIONS:
                     calls = entry.get("inbound_nodes")
                     layers += max(1, len(calls) if isinstance(calls, list) else 0)
-            pending += [(name, value) for key, value in entry.items() if key not in _NOT_SIZES]
+            for key, value in entry.items():
+                if key not in _NOT_SIZES or not isinstance(value, int):
+                    pending.append((name, value))
         elif isinstance(entry, list):
             pending += [(name, value) for value in entry]
         elif isinstance(entry, int) and abs(entry) > _LARGEST_NUMBER:
@@ -165,14 +170,22 @@ def _require_known_layers(config: dict[str, Any], path: str) -> None:
 def _is_known(entry: dict[str, Any]) -> bool:
     """Returns whether Keras makes an object of a known class from this part of a configuration."""
     kind, module = entry["class_name"], entry.get("module")
-    if not isinstance(kind, str) or entry.get("registered_name") not in (None, kind):
+    if (
+        not isinstance(kind, str)
+        or not isinstance(module, str | None)
+        or entry.get("registered_name") not in (None, kind)
+    ):
         return False
     if kind == "function":
         return module == "builtins" and isinstance(entry.get("config"), str)
+    if kind in _ARRAYS:
+        settings = entry.get("config")
+        return isinstance(settings, dict) and settings.get("dtype") in _TYPES
     return (
         kind in _VALUES
+        or (module, kind) in _FURTHER
         or (module in _PLACES_OF_LAYERS and kind in _LAYERS | {"DTypePolicy"})
-        or (isinstance(module, str) and module in _OPERATIONS | _PARTS)
+        or module in _OPERATIONS | _PARTS
     )
 
 

@@ -110,6 +110,14 @@ STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
     ),
     "layer of a user": (layer("twice", registered_name="a>b"), "twice is a RepeatVector"),
     "layer of another module": (layer("twice", module="os"), "twice is a RepeatVector"),
+    "layer in a seed": (
+        layer("features", seed={"module": "keras.layers", "class_name": "Lambda", "config": {}}),
+        "features is a Lambda",
+    ),
+    "texts of 1 GB": (
+        layer("twice", n={"class_name": "__numpy__", "config": {"value": [""], "dtype": "S1e9"}}),
+        "twice is a __numpy__",
+    ),
     "layer that is a list": (layer("twice", class_name=[1]), r"twice is a \[1\]"),
     "large number": (layer("twice", n=10**8), "twice has a number of 9 digits, more than 8192"),
     "large output": (layer("twice", n=8000), "twice.* makes 48000 numbers"),
