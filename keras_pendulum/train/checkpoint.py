@@ -155,7 +155,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
     with report_damage(path):
         weights = [array for layer in recorded.layers for array in (layer.kernel, layer.bias)]
         paths = [variable.path for variable in run.agent.online.weights]
-        if config.episodes != stored.episodes and config.average_updates > 1:
+        if config.episodes != recorded.config.episodes and config.average_updates > 1:
             # The old average belongs to a run of another length.
             names = [f"{config.optimizer}/{path.replace('/', '_')}_average" for path in paths]
             agent["optimizer"] |= dict(zip(names, weights, strict=True))
