@@ -47,9 +47,10 @@ class Diagnosis:
         measurement = self.measurement
         regret = f"regret {measurement.regret:.2f}"
         if not self.findings:
-            cost = measurement.discount_cost
-            little = measurement.regret_tolerance - cost
-            allowed = f"the discount alone costs {cost:.2f}, and up to {little:.1f} more is little"
+            discount_cost = measurement.discount_cost
+            little = measurement.regret_tolerance - discount_cost
+            allowed = f"the discount alone costs {discount_cost:.2f}, and up to {little:.1f} more "
+            allowed += "is little"
             if measurement.regret <= measurement.regret_tolerance:
                 return f"No finding: {regret}; {allowed}."
             return f"No finding, but {regret}; {allowed}: train for longer."

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import matplotlib
 import pytest
+from cycler import cycler
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis.report import as_html
@@ -16,11 +18,11 @@ from keras_pendulum.history import EpisodeRecord
 
 HISTORY = [EpisodeRecord(i, -1.0 - i, -200.0, 0.9, 0.5, 200, 40, 1.0) for i in range(12)]
 # Each would end in an error, or change the picture.
-SETTINGS = {
+SETTINGS: Any = {
     "text.usetex": True,
     "font.size": 30,
     "savefig.transparent": True,
-    "axes.prop_cycle": matplotlib.cycler(color=["black"]),
+    "axes.prop_cycle": cycler(color=["black"]),
 }
 
 
