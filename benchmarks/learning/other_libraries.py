@@ -1,13 +1,14 @@
-"""The training of `reference` by other libraries, with the same settings.
+"""The training of a preset by other libraries, with the same settings.
 
     python -m benchmarks.learning.other_libraries    # prints which libraries are installed
-    python -m benchmarks.learning.other_libraries sb3|sbx SEED OUT.npz
+    python -m benchmarks.learning.other_libraries sb3|sbx PRESET SEED OUT.npz
 
 Trains a DQN of Stable-Baselines3 (PyTorch) or of sbx (JAX) and writes the network's weights to
-OUT.npz, in Keras's order. Needs the extra `bench`. The settings are those of the preset, except
-where the libraries differ: both use the Huber loss of the taken action. Both count the period of
-the target update in steps, so they make their updates, as many as here, after every few steps and
-not after the episode.
+OUT.npz, in Keras's order. Needs the extra `bench`. PRESET is `reference` or `swingup`. The settings
+are those of the preset, except where the libraries differ: both use the Huber loss of the taken
+action and their own initial weights. Neither averages its weights, as `swingup` does
+(`average_updates`). Both count the period of the target update in steps, so they make their
+updates, as many as here, after every few steps and not after the episode.
 """
 
 from __future__ import annotations
@@ -27,17 +28,20 @@ from keras_pendulum.config.presets import preset
 from keras_pendulum.environments.actions import TorqueGrid
 
 
-class DiscreteTorques(gymnasium.ActionWrapper[Any, Any, Any]):
-    """The pendulum with the index of a torque as its action."""
+class TrainingPendulum(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """The pendulum with the index of a torque as its action, and scaled rewards."""
 
     def __init__(self, config: Config) -> None:
         super().__init__(config.task.make_env(steps=config.max_episode_steps))
+        self._reward_scale = config.reward_scale
         self._torques = TorqueGrid(config.torque_count)
         self.action_space = gymnasium.spaces.Discrete(config.torque_count)
 
-    def action(self, action: Any) -> NDArray[np.float64]:
-        """Returns the torque [1] in N·m."""
-        return self._torques.to_env_action(int(action))
+    def step(self, action: Any) -> Any:
+        """Makes a step with the torque of this index; returns what Gymnasium returns."""
+        torque = self._torques.to_env_action(int(action))
+        observation, reward, *rest = self.env.step(torque)
+        return observation, self._reward_scale * float(reward), *rest
 
 
 def common_settings(config: Config) -> dict[str, Any]:
@@ -45,7 +49,7 @@ def common_settings(config: Config) -> dict[str, Any]:
     periods = math.gcd(config.max_episode_steps, config.updates_per_episode)  # per episode
     steps, updates = config.max_episode_steps // periods, config.updates_per_episode // periods
     return {
-        "env": DiscreteTorques(config),
+        "env": TrainingPendulum(config),
         "buffer_size": config.replay_capacity,
         "learning_starts": config.warmup_episodes * config.max_episode_steps,
         "batch_size": config.batch_size,
@@ -61,7 +65,8 @@ def common_settings(config: Config) -> dict[str, Any]:
 
 def learning_rate_schedule(config: Config) -> Callable[[float], float]:
     """Returns the cosine schedule; its argument is the remaining share of the run."""
-    return lambda remaining: config.learning_rate * (1 - math.cos(math.pi * remaining)) / 2
+    low, high = config.learning_rate_min, config.learning_rate
+    return lambda remaining: low + (high - low) * (1 - math.cos(math.pi * remaining)) / 2
 
 
 def epsilon_schedule(config: Config) -> Callable[[float], float]:
@@ -117,7 +122,11 @@ def train_sbx(config: Config) -> list[NDArray[np.float32]]:
 
     def adam(learning_rate: float) -> optax.GradientTransformation:
         return optax.adam(
-            optax.cosine_decay_schedule(config.learning_rate, max(1, config.total_updates))
+            optax.cosine_decay_schedule(
+                config.learning_rate,
+                max(1, config.total_updates),
+                alpha=config.learning_rate_min / config.learning_rate,
+            )
         )
 
     sbx.dqn.policies.QNetwork = Network
@@ -134,13 +143,15 @@ def train_sbx(config: Config) -> list[NDArray[np.float32]]:
     return [np.asarray(array) for array in arrays]
 
 
-def main(library: str | None = None, seed: str = "0", out: str = "") -> None:
+def main(
+    library: str | None = None, name: str = "reference", seed: str = "0", out: str = ""
+) -> None:
     """Trains and writes the weights, or prints which libraries are installed."""
     if library is None:
         print("\n".join(versions(["stable-baselines3", "torch", "sbx-rl", "jax"])))
         return
     train = {"sb3": train_sb3, "sbx": train_sbx}[library]
-    np.savez(out, *train(preset("reference", seed=int(seed))))
+    np.savez(out, *train(preset(name, seed=int(seed))))
 
 
 if __name__ == "__main__":

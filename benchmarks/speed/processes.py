@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import subprocess
 import sys
@@ -64,12 +63,9 @@ def resident_memory(process: psutil.Process) -> float:
 def run_process(*arguments: str, python: str = sys.executable) -> Process:
     """Runs `python ARGUMENTS` and waits for it. Raises CalledProcessError when it fails."""
     command = [python, *arguments]
-    # As from a shell: this package sets the number of threads for its own process only.
-    environment = {**os.environ}
-    environment.pop("TF_NUM_INTRAOP_THREADS", None)
     with tempfile.TemporaryFile("w+", encoding="utf-8") as output:
         started = time.perf_counter()
-        process = subprocess.Popen(command, stdout=output, env=environment)
+        process = subprocess.Popen(command, stdout=output)
         with PeakMemory(process.pid) as peak:
             process.wait()
             seconds = time.perf_counter() - started
