@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from multiprocessing.pool import Pool
 
-import numpy as np
-
 import keras_pendulum as kp
+from benchmarks.learning.regrets import mean_and_interval
 from benchmarks.result_files import Row
 
 
@@ -26,19 +24,13 @@ def regret(config: kp.Config, starts: range) -> float:
     return round(kp.evaluate_policy(network, episodes=len(starts), seed=starts[0]).regret, 2)
 
 
-def interval(regrets: Sequence[float]) -> str:
-    """Returns the 95 % percentile-bootstrap interval of the mean, such as `1.2 to 1.5`."""
-    resampled = np.random.default_rng(0).choice(regrets, (9999, len(regrets))).mean(axis=1)
-    low, high = np.quantile(resampled, (0.025, 0.975))
-    return f"{low:.1f} to {high:.1f}"
-
-
 def table_row(name: str, regrets: list[float]) -> Row:
     """Returns the row of a variant with its regrets, one for each training seed."""
+    mean, interval = mean_and_interval(regrets)
     return {
         "training": name,
-        "mean regret": round(sum(regrets) / len(regrets), 2),
-        "95 % interval": interval(regrets),
+        "regret": mean,  # interquartile mean
+        "95 % interval": interval,
         "worst regret": max(regrets),
         "regrets": regrets,
     }

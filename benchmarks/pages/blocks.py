@@ -18,7 +18,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "comparison": preset_blocks.comparison,
     "presets": preset_blocks.presets,
     "settings": preset_blocks.settings,
-    "quality": lambda: markdown(rows_of("quality")),
+    "quality": preset_blocks.quality,
     **{f"departures of {name}": partial(preset_blocks.departure_table, name) for name in BEFORE},
     "choosing": preset_blocks.choosing,
     "steps": study_blocks.steps,

@@ -6,13 +6,20 @@ from dataclasses import fields
 from typing import Any
 
 import keras_pendulum as kp
-from benchmarks.learning.departures import BEFORE, departures, measured
+from benchmarks.learning.departures import BEFORE, MEASURED_HERE, departures, measured
+from benchmarks.learning.regrets import STATISTIC, mean_and_interval, number, summary
 from benchmarks.learning.rejected_settings import ARMS
-from benchmarks.learning.variants import interval
+from benchmarks.learning.study import table
 from benchmarks.pages.reasons import REASONS
 from benchmarks.result_files import Row, markdown, rows_of
 from keras_pendulum.config.fields import format_value
 from keras_pendulum.config.presets import DESCRIPTIONS, PRESETS
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.optimum.solutions import solution
+from keras_pendulum.study.job import EVALUATION_EPISODES
+
+# The results of `original` are in those of the departures of `reference`.
+MEASURED_WITH = {"original": "reference"}
 
 
 def score() -> str:
@@ -22,21 +29,23 @@ def score() -> str:
 
 def story() -> str:
     """Returns the table of the original, the fixed agent, the optimum and random torques."""
-    original, fixed = (row_of("quality", preset=f"`{name}`") for name in ("original", "reference"))
-    random_return = float(printed_by("train")[0].split(": ")[1])
-    optimum = float(fixed["best possible return"])
-    policies = {
-        "the original program": (original["mean return"], original["mean regret"]),
-        "the same design, fixed": (fixed["mean return"], fixed["mean regret"]),
-        "the exact optimum": (fixed["best possible return"], "0"),
-        "random torques": (f"{random_return:.1f}", f"{optimum - random_return:.1f}"),
-    }
-    return markdown(
-        [
-            {"policy": policy, "mean return": mean_return, "regret": regret}
-            for policy, (mean_return, regret) in policies.items()
-        ]
-    )
+    exact = solution(Pendulum())
+    optimum = float(exact.best_returns(range(EVALUATION_EPISODES)).mean())
+    arms = {arm["arm"]: arm for arm in table()["rows"]}
+    rows = []
+    for policy, name in {
+        "the original program": "original",
+        "the same design, fixed": "reference",
+    }.items():
+        regret, low, high = (arms[name][f"regret_{part}"] for part in ("iqm", "low", "high"))
+        # The starts are the same for all runs, so this is the interquartile mean of the returns.
+        cells = f"{optimum - regret:.1f}", number(regret), f"{number(low)} to {number(high)}"
+        rows.append((policy, *cells))
+    random_return = exact.random_return()
+    rows.append(("the exact optimum", f"{optimum:.1f}", "0", "–"))
+    rows.append(("random torques", f"{random_return:.1f}", number(optimum - random_return), "–"))
+    columns = ("policy", "mean return", "regret", "95 % interval")
+    return markdown([dict(zip(columns, row, strict=True)) for row in rows])
 
 
 def first_run() -> str:
@@ -69,15 +78,31 @@ def printed_by(command: str) -> list[str]:
     return [row["line"] for row in rows_of("first_run") if row["command"] == command]
 
 
-def summary(regrets: list[float]) -> str:
-    """Returns mean and worst regret, from 10 runs on with the interval of the mean."""
-    uncertainty = f" ({interval(regrets)})" if len(regrets) >= 10 else ""
-    return f"mean {sum(regrets) / len(regrets):.1f}{uncertainty}, worst {max(regrets):.1f}"
-
-
 def fenced(lines: list[str]) -> str:
     """Returns lines as a block of code."""
     return "\n".join(["```text", *lines, "```"]) + "\n"
+
+
+def quality() -> str:
+    """Returns the regrets of the presets, with the statistic of the page's regrets."""
+    rows = []
+    for row in rows_of("quality"):
+        name = row["preset"].strip("`")
+        regrets = measured(MEASURED_WITH.get(name, name))[name]
+        mean, interval = mean_and_interval(regrets)
+        rows.append(
+            {
+                "preset": row["preset"],
+                "task": row["task"],
+                "best possible return": row["best possible return"],
+                "training seeds": len(regrets),
+                "regret": mean,
+                "95 % interval": interval,
+                "worst": number(max(regrets)),
+                "whole command": row["whole command"],
+            }
+        )
+    return f"{markdown(rows)}\nEach regret of this page is the {STATISTIC}.\n"
 
 
 def presets() -> str:
@@ -113,6 +138,11 @@ def departure_table(preset: str) -> str:
     """Returns a preset's departures from the earlier one with reasons and measured regrets."""
     earlier, later = kp.preset(BEFORE[preset]), kp.preset(preset)
     regrets = measured(preset)
+    command = "learning.study FOLDER"
+    if preset in MEASURED_HERE:
+        command = f"learning.departures {preset}"
+    # Most runs of CartPole lose nothing, with and without a departure; a few lose much.
+    shown = with_bad_runs if preset == "cartpole" else summary
     rows = []
     for name in departures(preset):
         if name not in REASONS[preset]:
@@ -121,8 +151,8 @@ def departure_table(preset: str) -> str:
             )
         if name not in regrets:
             raise SystemExit(
-                f"error: benchmarks/results/departures_{preset}.json has no row {name}: run "
-                f"`python -m benchmarks.learning.departures {preset}`"
+                f"error: the results have no {preset} without {name}: run "
+                f"`python -m benchmarks.{command}`"
             )
         rows.append(
             {
@@ -130,13 +160,23 @@ def departure_table(preset: str) -> str:
                 earlier.preset: format_value(getattr(earlier, name)),
                 preset: format_value(getattr(later, name)),
                 "why": REASONS[preset][name],
-                "regret without it": summary(regrets[name]),
+                "regret without it": shown(regrets[name]),
             }
         )
     regret_lines = "".join(
-        f"- `{name}`: {summary(regrets[name])}\n" for name in (preset, earlier.preset)
+        f"- `{name}`: {shown(regrets[name])}\n" for name in (preset, earlier.preset)
     )
-    return f"The regrets of both presets:\n\n{regret_lines}\n{markdown(rows)}"
+    seeds = len(regrets[preset])
+    return (
+        f"The regrets of both presets, from {seeds} training seeds:\n\n{regret_lines}\n"
+        f"{markdown(rows)}"
+    )
+
+
+def with_bad_runs(regrets: list[float]) -> str:
+    """Returns the summary of some runs, and how many of them have a regret above 0."""
+    bad = sum(regret > 0 for regret in regrets)
+    return f"{summary(regrets)}, {bad} of {len(regrets)} runs above 0"
 
 
 def choosing() -> str:

@@ -2,59 +2,46 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 from benchmarks.learning.departures import departures
-from benchmarks.result_files import ROOT, markdown, rows_of
+from benchmarks.learning.regrets import STATISTIC, number
+from benchmarks.learning.study import table
+from benchmarks.result_files import markdown, rows_of
 from keras_pendulum.study.arms import default_arms, describe_setting
-
-STUDY = ROOT / "docs" / "study"
-
-
-def study() -> dict[str, Any]:
-    """Returns the table of the study."""
-    table: dict[str, Any] = json.loads((STUDY / "table.json").read_text("utf-8"))
-    return table
-
-
-def number(value: float) -> str:
-    """Returns a regret with three digits, such as 1.79, 73.3 or 1218."""
-    return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
 
 
 def steps() -> str:
     """Returns the regrets of the study's arms from `original` to `reference`, in one paragraph."""
-    arms = {arm["arm"]: number(arm["regret_iqm"]) for arm in study()["rows"]}
+    arms = {arm["arm"]: number(arm["regret_iqm"]) for arm in table()["rows"]}
     changes = []
     for name, regret in arms.items():
         setting, equals, value = name.removeprefix("+ ").partition("=")
         if name.startswith("+ ") and equals:
             label = describe_setting(setting, int(value) if value.isdecimal() else value)
             changes.append(f"{regret} ({label})")
-    runs = study()["rows"][0]["runs"]
     (last,) = [arm.label for arm in default_arms() if arm.name == "reference"]
     label = last.removeprefix("+ ").removesuffix(" = reference")
     changes.append(f"{arms['reference']} ({label})")
     return (
-        "The main fault is **one update per 200 steps**. The regret (mean of "
-        f"{runs} training seeds without the extremes) is {arms['original']} for the original. With "
-        f"one change after the other it is {', '.join(changes[:-1])} and {changes[-1]}.\n"
+        "The main fault is **one update per 200 steps**. Here and in the table, the regret of a "
+        f"program is the {STATISTIC}. It is {arms['original']} for the original, from "
+        f"{table()['rows'][0]['runs']} seeds. With one change after the other it is "
+        f"{', '.join(changes[:-1])} and {changes[-1]}.\n"
     )
 
 
 def study_table() -> str:
     """Returns the study's table without its wide columns, and with which version it was made."""
-    lines = (STUDY / "table.md").read_text("utf-8").splitlines()
-    header, _, *body = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in lines
-        if line.startswith("|")
+    rows = [
+        {
+            "arm": arm["arm"],
+            "regret": number(arm["regret_iqm"]),
+            "95 % interval": f"{number(arm['regret_low'])} to {number(arm['regret_high'])}",
+            "worst": number(arm["regret_worst"]),
+            "discount alone": number(arm["discount_regret"]),
+        }
+        for arm in table()["rows"]
     ]
-    columns = [name for name in header if name not in ("task", "runs", "mean")]
-    columns = [name for name in columns if not name.startswith("better")]
-    rows = [{name: row[header.index(name)] for name in columns} for row in body]
-    runs = {row[header.index("runs")] for row in body}
+    runs = {str(arm["runs"]) for arm in table()["rows"]}
     arms = " ".join(row["arm"] for row in rows)
     unknown = [name for name in departures("reference") if f"without {name}" not in arms]
     note = (
@@ -65,20 +52,20 @@ def study_table() -> str:
     )
     return (
         f"{' or '.join(sorted(runs))} seeds for each arm, made by keras_pendulum "
-        f"{study()['versions']['keras_pendulum']}.{note}\n\n{markdown(rows)}"
+        f"{table()['versions']['keras_pendulum']}.{note}\n\n{markdown(rows)}"
     )
 
 
 def study_arm(name: str) -> str:
     """Returns the regret of an arm with its interval."""
-    arm = next(arm for arm in study()["rows"] if arm["arm"] == name)
+    arm = next(arm for arm in table()["rows"] if arm["arm"] == name)
     low, high = number(arm["regret_low"]), number(arm["regret_high"])
     return f"{number(arm['regret_iqm'])} ({low} to {high})"
 
 
 def exercise_updates() -> str:
     """Returns the expected regrets of the first exercise."""
-    change = next(arm["arm"] for arm in study()["rows"] if arm["arm"].startswith("+ updates"))
+    change = next(arm["arm"] for arm in table()["rows"] if arm["arm"].startswith("+ updates"))
     return (
         f"Expected: {study_arm('original')} without the change, {study_arm(change)} with "
         f"`{change.removeprefix('+ ')}`, as interquartile mean and 95 % interval over the seeds of "

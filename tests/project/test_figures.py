@@ -12,8 +12,10 @@ from conftest import ROOT
 
 import keras_pendulum as kp
 from benchmarks.learning.departures import BEFORE, departures
+from benchmarks.learning.regrets import STATISTIC, number
+from benchmarks.learning.study import table
 from benchmarks.pages.blocks import BLOCKS, documents
-from benchmarks.pages.preset_blocks import printed_by
+from benchmarks.pages.preset_blocks import printed_by, with_bad_runs
 from benchmarks.pages.reasons import REASONS
 from benchmarks.tables import block_names, rewrite, without_blocks
 
@@ -68,6 +70,31 @@ def test_rewrite_replaces_a_stale_block_only() -> None:
     new = rewrite(text)
     assert new == text.replace("stale\n", BLOCKS["quality"]())
     assert rewrite(new) == new
+
+
+@pytest.mark.parametrize("arm", ["original", "reference"])
+def test_all_pages_show_one_regret_of_a_preset(arm: str) -> None:
+    row = next(row for row in table()["rows"] if row["arm"] == arm)
+    regret = number(row["regret_iqm"])
+    interval = f"{number(row['regret_low'])} to {number(row['regret_high'])}"
+    assert f"| {regret} | {interval} |" in BLOCKS["story"]()
+    assert re.search(rf" {regret} (for the original|\()", BLOCKS["steps"]())
+    assert f"| {arm} | {regret} | {interval} |" in BLOCKS["study"]()
+    assert f"| {regret} | {interval} |" in BLOCKS["quality"]()
+    assert f"- `{arm}`: {regret} ({interval}), worst" in BLOCKS["departures of reference"]()
+
+
+@pytest.mark.parametrize("block", ["steps", "quality"])
+def test_page_says_once_what_its_regrets_are(block: str) -> None:
+    (page,) = [page for page in DOCUMENTS if f"<!-- {block}: " in page.read_text("utf-8")]
+    assert page.read_text("utf-8").count("interquartile mean") == 1
+    assert STATISTIC in BLOCKS[block]()
+
+
+def test_runs_above_zero_are_counted_where_most_runs_lose_nothing() -> None:
+    shown = with_bad_runs([0.0] * 9 + [20.0])
+    assert shown.startswith("0.00 (0.00 to ")
+    assert shown.endswith("), worst 20.0, 1 of 10 runs above 0")
 
 
 @pytest.mark.parametrize("preset", BEFORE)
