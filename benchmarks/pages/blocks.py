@@ -30,6 +30,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "last regret": lambda: markdown(rows_of(code_blocks.LAST_REGRET)),
     "last regret of swingup": lambda: markdown(rows_of("last_regret_swingup")),
     "shares of the last regret": code_blocks.last_regret_shares,
+    "benchmarks": code_blocks.benchmarks,
     "recorded runs": code_blocks.recorded_runs,
     "recorded run of CartPole": lambda: markdown(rows_of("recorded_cartpole")),
     "learning of CartPole": lambda: markdown(rows_of("cartpole_learning")),

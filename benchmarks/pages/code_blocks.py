@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from benchmarks.commands import COMMANDS, hours
 from benchmarks.result_files import RESULTS, ROOT, Row, machine_of, markdown, rows_of
 
 LAST_REGRET = "last_regret_reference"
@@ -12,6 +13,22 @@ DQN_FILES = (
     *("dqn/exploration.py", "dqn/policy.py", "dqn/agent.py", "dqn/random_streams.py"),
     *("train/loop.py", "train/run.py"),
 )
+
+
+def benchmarks() -> str:
+    """Returns the list of the benchmarks in their order, and the hours of all."""
+    rows = [
+        {
+            "command": f"`{command.line}`",
+            "what it measures or makes": _title(
+                (ROOT / "benchmarks" / f"{command.module.replace('.', '/')}.py").read_text("utf-8")
+            ),
+            "minutes": command.minutes,
+            "extra": f"`{command.extra}`" if command.extra else "–",
+        }
+        for command in COMMANDS
+    ]
+    return f"{markdown(rows)}\nAll together take {hours(COMMANDS)} on two cores.\n"
 
 
 def recorded_runs() -> str:

@@ -3,9 +3,9 @@
     python -m benchmarks.pages.first_run
 
 Runs them in an empty folder. Writes what they print to benchmarks/results, and their pictures to
-docs/: run.png, diagnose.png and compare.png. The shipped policy `reference` is the run of the first
-line in README.md, made by `benchmarks.learning.preset_results`; run that first. It takes a minute
-on two cores.
+docs/: run.png, diagnose.png, compare.png and the film swingup.gif. The shipped policy `reference`
+is the run of the first line in README.md, made by `benchmarks.learning.preset_results`; run that
+first. It takes a minute on two cores.
 """
 
 from __future__ import annotations
@@ -39,6 +39,8 @@ def main() -> None:
                 rows += [{"command": command, "line": line} for line in output.splitlines()]
         shutil.copy("runs/reference-seed0/rewards.png", _DOCS / "run.png")
         shutil.copy("comparison.png", _DOCS / "compare.png")
+    film = ["--start", "hanging", "--gif", str(_DOCS / "swingup.gif")]
+    run_process("-m", "keras_pendulum.evaluate", "swingup", *film)
     kp.diagnose("original").figure().savefig(_DOCS / "diagnose.png", dpi=60)
     random = solution(Pendulum()).random_return()
     line = f"Uniformly random actions on the same starts: {random:.2f}"

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import ast
+import json
 import re
 from collections.abc import Iterator
 
 import pytest
 from conftest import ROOT
 from test_floor_plan import imports
+
+from benchmarks.commands import COMMANDS as LISTED
+from benchmarks.commands import Command
+from benchmarks.diagnosis.healthy_networks import COUNTS
 
 BENCHMARKS = ROOT / "benchmarks"
 MODULES = {
@@ -18,6 +24,7 @@ MODULES = {
 COMMANDS = {name for name, text in MODULES.items() if '__name__ == "__main__"' in text}
 # From the top down: what writes into the pages reads the results of what measures.
 ORDER = (
+    "all",
     "tables",
     "pages",
     "diagnosis",
@@ -25,8 +32,12 @@ ORDER = (
     "speed",
     "files",
     "recorded_runs",
+    "commands",
     "result_files",
 )
+# `all` runs the others, and another benchmark starts the other libraries.
+NOT_LISTED = {"all", "learning.other_libraries"}
+RESULTS = BENCHMARKS / "results"
 NAMING = (
     *("*.md", "docs/*.md", "benchmarks/results/*.md", "benchmarks/results/*.json"),
     *("benchmarks/**/*.py", "keras_pendulum/**/*.py", "tests/torch/*.py"),
@@ -74,8 +85,55 @@ def test_name_of_a_missing_module_is_found(text: str) -> None:
     assert list(wrong_names(text))
 
 
-def test_page_lists_every_command() -> None:
+def test_table_of_commands_has_every_module_with_a_main() -> None:
+    assert {command.module for command in LISTED} == COMMANDS - NOT_LISTED
+    names = [command.name for command in LISTED]
+    assert len(names) == len({*names})
+
+
+def test_each_results_file_is_written_by_one_listed_command() -> None:
+    names = [name for command in LISTED for name in command.results]
+    assert len(names) == len({*names})
+    assert {path.stem for path in RESULTS.glob("*.json")} <= {*names}
+    assert {path.stem for path in RESULTS.glob("*.md")} <= {*names}
+
+
+@pytest.mark.parametrize("command", LISTED, ids=lambda command: command.name)
+def test_listed_results_are_those_that_the_module_writes(command: Command) -> None:
+    source = MODULES[command.module]
+    # `write("NAME", …)`, where {…} may be anything; or a table of the names by preset.
+    written = re.findall(r'\bwrite\(\s*f?"([^"]+)"', source)
+    patterns = [re.sub(r"\\\{.*?\\\}", r"\\w+", re.escape(name)) for name in written]
+    by_preset = dict(re.findall(r'"(\w+)": "(learning\w*)"', source))
+    patterns += [name for preset, name in by_preset.items() if preset in command.arguments]
+    for name in command.results:
+        assert any(re.fullmatch(pattern, name) for pattern in patterns)
+    for pattern in patterns:
+        assert any(re.fullmatch(pattern, name) for name in command.results)
+
+
+def test_each_results_file_names_its_machine() -> None:
+    for path in RESULTS.glob("*.json"):
+        assert " cores of " in json.loads(path.read_text("utf-8"))["machine"], path.name
+
+
+def test_page_lists_the_commands_in_their_order() -> None:
     page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
-    # Another benchmark starts the other libraries.
-    listed = set(re.findall(r"-m benchmarks\.([\w.]*\w)", page))
-    assert listed == COMMANDS - {"learning.other_libraries"}
+    assert re.findall(r"^\| `(python -m benchmarks\..*?)` \|", page, re.MULTILINE) == [
+        command.line for command in LISTED
+    ]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_command_trains_with_at_most_ten_seeds_by_default(module: str) -> None:
+    for node in ast.parse(MODULES[module]).body:
+        if isinstance(node, ast.FunctionDef) and node.name == "main":
+            names = [argument.arg for argument in node.args.args]
+            defaults = node.args.defaults
+            for name, default in zip(names[len(names) - len(defaults) :], defaults, strict=True):
+                if name in ("seeds", "rounds"):
+                    assert int(ast.literal_eval(default)) <= 10
+
+
+def test_healthy_networks_have_at_most_ten_seeds() -> None:
+    assert max(COUNTS.values()) <= 10
