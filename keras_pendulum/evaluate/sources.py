@@ -18,7 +18,6 @@ from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.q_policies import DQNPolicy, QPolicy
 from keras_pendulum.evaluate.torque_policies import FunctionPolicy, PredictPolicy, has_predict
 from keras_pendulum.storage.find_weights import find_weights
-from keras_pendulum.storage.keras_models import load_keras_model
 from keras_pendulum.storage.load_weights import load_weights
 
 _EXPECTED = (
@@ -101,4 +100,6 @@ def load_keras_file(
         file = find_weights(path)
         if Path(file).suffix.lower() != ".keras":
             raise UnknownLayersError(f"{unknown}; save other models as .keras") from unknown
+        from keras_pendulum.storage.keras_models import load_keras_model
+
         return load_keras_model(file)
