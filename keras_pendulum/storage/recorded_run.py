@@ -84,7 +84,7 @@ def read_run(file: H5File, path: str | os.PathLike[str]) -> RecordedRun:
         raise ValueError(f"its layers have {widths} units; its settings say {expected}")
     history = _read_history(file, config)
     added, steps = state["replay_added"], history[-1].environment_steps if history else 0
-    if added != steps:
+    if not isinstance(added, int) or added != steps:
         raise ValueError(f"replay_added is {added!r}; its history has {steps} steps")
     return RecordedRun(config, history, _read_replay(file, config, steps), layers, state)
 

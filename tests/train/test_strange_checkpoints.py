@@ -105,6 +105,7 @@ STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
     ),
     "transitions of another run": (state(replay_added=5), "replay_added is 5; its history has 600"),
     "replay_added that is text": (state(replay_added="a"), "replay_added is 'a'"),
+    "replay_added that is a float": (state(replay_added=600.0), r"replay_added is 600\.0"),
     "another task": (state(gravity=9.0), "its weights belong to Pendulum-v1, g = 1"),
     "layers of other settings": (
         state(hidden_units=[8192, 7000]),
