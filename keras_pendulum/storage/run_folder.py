@@ -22,7 +22,7 @@ from keras_pendulum.history import EpisodeRecord, csv_header
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.find_weights import checkpoints_in
 from keras_pendulum.storage.folder_lock import lock_folder
-from keras_pendulum.storage.small_files import require_folder, require_regular
+from keras_pendulum.storage.small_files import read_small_file, require_folder, require_regular
 from keras_pendulum.storage.snapshots import snapshots_file
 
 
@@ -136,8 +136,8 @@ class RunFolder:
 
     def warn_if_edited(self, config: Config) -> None:
         """Warns when config.json does not hold these settings, those of the checkpoint."""
-        with contextlib.suppress(OSError, ValueError, RecursionError):
-            found = json.loads(self.config.read_text(encoding="utf-8"))
+        with contextlib.suppress(OSError, ValueError, RecursionError, UserError):
+            found = json.loads(read_small_file(self.config))
             if found != json.loads(json.dumps(asdict(config))):
                 warnings.warn(
                     f"{self.path / self.config.name} is not used: the settings of the run are in "
