@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -38,14 +39,17 @@ def require_type(name: str, value: object, expected: type | tuple[type, ...]) ->
         raise TypeError(one_line(f"{name} is {value!r}; expected {names}"))
 
 
-def require_finite(weights: Iterable[NDArray[Any]]) -> None:
-    """Raises UserError when a weight is NaN or infinite, which `load_weights` rejects."""
+def require_finite(weights: Iterable[NDArray[Any]], largest: float = math.inf) -> None:
+    """Raises UserError when a weight is NaN, infinite or beyond `largest`.
+
+    `load_weights` rejects such a network.
+    """
     import numpy as np
 
-    if not all(np.isfinite(array).all() for array in weights):
+    if not all(np.isfinite(array).all() and np.abs(array).max() <= largest for array in weights):
         raise UserError(
-            "a weight is not finite, learning has diverged; such a network is neither saved nor "
-            "evaluated: try a smaller learning_rate"
+            f"a weight is not finite, or beyond {largest:g}: learning has diverged; such a network "
+            "is neither saved nor evaluated: try a smaller learning_rate"
         )
 
 

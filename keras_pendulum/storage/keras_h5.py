@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from keras_pendulum.dqn.network import REGISTERED_NAME
 from keras_pendulum.errors import UnknownLayersError, WeightsError
+from keras_pendulum.limits import LARGEST_WEIGHT
 from keras_pendulum.storage.layer_order import StoredLayer, call_order
 from keras_pendulum.storage.model_config import dense_layers
 from keras_pendulum.storage.quarantine import H5File
 
 _LARGEST_LAYER = 8192  # units
-_LARGEST_WEIGHT = 1e6  # those of a network that learned well are below 100
 # Kinds of layers without weights that keep the network a chain of Dense layers.
 _WITHOUT_WEIGHTS = {
     *("input", "input_layer", "flatten", "dropout", "activation"),
@@ -117,10 +117,10 @@ def _read_layer(file: H5File, path: str, stored: StoredLayer, activation: str | 
 def require_sane(array: NDArray[Any], name: str, path: str | os.PathLike[str]) -> None:
     """Raises WeightsError for a weight so large that the network's outputs could overflow."""
     largest = np.abs(array).max(initial=0)
-    if largest > _LARGEST_WEIGHT:
+    if largest > LARGEST_WEIGHT:
         raise WeightsError(
             f"{os.fsdecode(path)}: {name} has a weight of the size {largest:.3g}; expected at most "
-            f"{_LARGEST_WEIGHT:g}: learning has diverged, or the file is damaged"
+            f"{LARGEST_WEIGHT:g}: learning has diverged, or the file is damaged"
         )
 
 

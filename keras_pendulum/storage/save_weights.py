@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.errors import UserError, WeightsError, require_finite, require_type
+from keras_pendulum.limits import LARGEST_WEIGHT
 from keras_pendulum.storage.checksum import write_with_checksum
 from keras_pendulum.storage.load_weights import GROUP, read_network
 from keras_pendulum.storage.quarantine import H5File
@@ -67,9 +68,9 @@ def encode_weights(
         evaluated_return: see `save_weights`.
         groups: further groups of arrays, by name.
 
-    Raises UserError when a weight is not finite.
+    Raises UserError when a weight is not finite, or too large to be loaded.
     """
-    require_finite(weights)
+    require_finite(weights, LARGEST_WEIGHT)
     values = {
         "version": __version__,
         "versions": json.dumps(_versions()),

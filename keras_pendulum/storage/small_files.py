@@ -49,7 +49,7 @@ def _mode(path: Path) -> int | None:
     """Returns the kind of what is at the path itself, also of a link; None where nothing is."""
     try:
         return path.lstat().st_mode
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):  # the folder does not exist either
         return None
 
 
