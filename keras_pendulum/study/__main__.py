@@ -81,7 +81,7 @@ def _study(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     for package in ("scipy", "distributed"):
         if importlib.util.find_spec(package) is None:
-            raise UserError(f'{package} is not installed: pip install "keras_pendulum[study]"')
+            raise UserError(f'{package} is not installed: pip install -e ".[study]" in the clone')
 
     from keras_pendulum.study.results_folder import ResultsFolder
 

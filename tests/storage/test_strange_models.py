@@ -125,5 +125,5 @@ def test_weight_that_no_network_learns_is_refused(
         kp.save_weights(network, tmp_path / "a.h5")
         kp.load_weights(tmp_path / "a.h5")
     else:
-        with pytest.raises(kp.UserError, match=r"a\.h5: .*expected at most 1e\+06"):
+        with pytest.raises(kp.UserError, match=r"beyond 1e\+06: learning has diverged"):
             kp.save_weights(network, tmp_path / "a.h5")

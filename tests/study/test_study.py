@@ -199,5 +199,5 @@ def test_missing_package_is_an_error_that_names_the_extra(
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert study_command.main([]) == 2
     assert capsys.readouterr().err == (
-        'error: scipy is not installed: pip install "keras_pendulum[study]"\n'
+        'error: scipy is not installed: pip install -e ".[study]" in the clone\n'
     )
