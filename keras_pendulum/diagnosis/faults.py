@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 class Fault(NamedTuple):
     """The explanation and the remedy of a fault."""
 
-    explanation: str  # two sentences
+    explanation: str  # two or three sentences
     remedy: str
     explains: tuple[str, ...] = ()  # other faults: what shows them is a trace of this one
 
@@ -25,7 +25,7 @@ FAULTS: dict[str, Fault] = {
     "no-bootstrapping": Fault(
         "The values are the rewards of one step. The agent does not look ahead, so it cannot swing "
         "the pendulum up.",
-        "Add γ·max Q(next) to each target; the pendulum never terminates, truncation is no end.",
+        "Add γ·max Q(next) to each target. The pendulum never terminates. Truncation is not an end.",
         ("too-few-updates", "reward-scale", "other-discount"),
     ),
     "other-discount": Fault(
@@ -36,7 +36,8 @@ FAULTS: dict[str, Fault] = {
     ),
     "reward-scale": Fault(
         "The values are those of rewards with another size. Large rewards need larger outputs than "
-        "the network reaches in time, and small ones are lost in the noise of its initial weights.",
+        "the network reaches in time. Small rewards are smaller than the noise of its initial "
+        "weights.",
         "Scale the rewards so that the values are between 1 and 100 in size.",
         ("too-few-updates",),
     ),
@@ -59,14 +60,15 @@ FAULTS: dict[str, Fault] = {
         ("overestimation",),
     ),
     "too-few-updates": Fault(
-        "The values have hardly left their initial size. Each update carries a reward back by one "
-        "step, so the values of the swing-up need thousands of updates.",
+        "The values are nearly as small as the initial ones. Each update carries a reward back by "
+        "one step, so the values of the swing-up need thousands of updates.",
         "Make more updates for each step of the environment, up to one for each step.",
         ("narrow-starts",),
     ),
     "misaligned-transitions": Fault(
-        "The values have no use for the torque, or a stored transition is one that the pendulum "
-        "cannot make. So observation, action, reward and next observation are of different steps.",
+        "The advantages are uncorrelated with the torque, or a stored transition is one that the "
+        "pendulum cannot make. So observation, action, reward and next observation are of "
+        "different steps.",
         "Store (s, a, r, s') of one step; copy the observation before the environment changes it.",
         ("too-few-updates",),
     ),
@@ -83,33 +85,34 @@ FAULTS: dict[str, Fault] = {
         "Train at the gravity at which you evaluate, or declare the one of the training.",
     ),
     "overestimation": Fault(
-        "The network promises more than its policy collects. The maximum of noisy values is too "
-        "high, and each target passes the error on.",
+        "The values of the network are higher than the returns of its policy. The maximum of noisy "
+        "values is too high, and each target takes it over.",
         "Use a target network, double Q-learning and a replay buffer of many episodes.",
     ),
     "narrow-starts": Fault(
-        "The values are right in a part of the plane and wrong in the rest. The agent has never "
-        "been in the rest.",
-        "Start the episodes all over the plane, and let them last long enough to leave the start.",
+        "The values are right in a part of the phase plane and wrong in the rest. The agent was "
+        "never in the rest.",
+        "Start the episodes in all parts of the plane, and make them long enough to leave the "
+        "start.",
     ),
     "forgetting": Fault(
-        "The replay buffer holds the last episodes only. What the network learned about the way "
-        "up is overwritten when no stored transition shows it.",
+        "The replay buffer holds only the last episodes. The network forgets the way up when no "
+        "stored transition shows it.",
         "Make the replay buffer larger: it should hold at least 14 000 transitions.",
     ),
     "exploration": Fault(
-        "The share of random actions does not fall, or has fallen before the values were known. So "
-        "the stored transitions do not show what good actions lead to.",
-        "Let ε fall from about 0.9 to 0.01 over the first half of the run.",
+        "The share of random actions does not fall, or it falls before the values are learned. So "
+        "the stored transitions do not show the results of good actions.",
+        "Let ε fall from about 0.9 to 0.01, below 0.1 in the first half of the run.",
     ),
     "learning-rate": Fault(
-        "The values change from update to update more than actions differ. The policy is still "
-        "jumping at the end of the run.",
+        "One update changes the values by more than the difference between actions. The policy "
+        "still jumps at the end of the run.",
         "Make the learning rate smaller, and let it fall to 0 at the end.",
     ),
     "undetermined": Fault(
-        "The values are wrong, but no single fault explains how. Several faults of the training "
-        "leave the same network behind.",
+        "The values are wrong, but no single fault explains them. Several faults of the training "
+        "cause the same network.",
         "Look at the loss and the return over the run. Of a run of this package, diagnose the "
         "folder: its history and replay buffer are used, too.",
     ),
@@ -143,7 +146,7 @@ class Finding:
 
     @property
     def explanation(self) -> str:
-        """Two sentences on the fault."""
+        """The explanation of the fault, in two or three sentences."""
         return FAULTS[self.name].explanation
 
     @property

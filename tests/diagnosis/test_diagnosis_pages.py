@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
+import pytest
 from conftest import ROOT
 
+import keras_pendulum as kp
 from benchmarks.diagnosis.labelled_networks import FAULTS
 from benchmarks.pages.fault_pictures import PICTURES, picture_cases
 from keras_pendulum.diagnosis.faults import FAULTS as TEXTS
+from keras_pendulum.dqn.exploration import epsilon_by_episodes
 
 DIAGNOSE = (ROOT / "docs" / "diagnose.md").read_text(encoding="utf-8")
 LEARN = (ROOT / "docs" / "my_dqn_does_not_learn.md").read_text(encoding="utf-8")
@@ -22,6 +26,29 @@ def sections(page: str) -> set[str]:
 def test_every_finding_has_a_section() -> None:
     assert sections(DIAGNOSE) == set(TEXTS)
     assert sections(LEARN) == set(FAULTS) == set(TEXTS) - {"undetermined"}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_section_has_the_sentences_of_the_finding(name: str) -> None:
+    found = re.search(rf"^### {name}\n\n(.*?)\n\nWhat to do: (.*?)\n(?:\n|\Z)", DIAGNOSE, re.M | re.S)
+    assert found is not None
+    explanation, remedy = (" ".join(text.split()) for text in found.groups())
+    fault = TEXTS[name]
+    assert explanation == fault.explanation
+    assert remedy == fault.remedy[0].lower() + fault.remedy[1:]
+
+
+def test_page_says_when_epsilon_of_the_reference_falls() -> None:
+    config = kp.preset()
+    schedule = partial(
+        epsilon_by_episodes, config.epsilon_start, config.epsilon_decay, config.epsilon_min
+    )
+    epsilons = [schedule(episode, 0) for episode in range(config.episodes)]
+    below = next(episode for episode, epsilon in enumerate(epsilons) if epsilon < 0.1)
+    lowest = epsilons.index(config.epsilon_min)
+    said = f"below 0.1 from episode {below} on, and reaches 0.01 in episode {lowest} of 500"
+    assert config.episodes == 500 and config.epsilon_min == 0.01
+    assert said in " ".join(LEARN.split())
 
 
 def test_every_fault_has_a_small_picture() -> None:
