@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import inspect
 import re
+from dataclasses import fields
 from typing import Any
 
+from keras_pendulum.config.config import Config
+from keras_pendulum.config.fields import format_value
 from keras_pendulum.version import __version__
 
 project = "keras_pendulum"
@@ -13,7 +16,12 @@ release = __version__
 copyright = "the keras_pendulum maintainers"
 
 default_role = "code"  # single backquotes in docstrings
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",  # links to the source
+]
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build", "study"]
 myst_heading_anchors = 3  # links such as presets.md#all-settings, as on GitHub
@@ -51,6 +59,22 @@ def readable_signature(
     return signature, returns and _ARRAY.sub(r"NDArray[\1]", returns)
 
 
+def add_settings(
+    app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]
+) -> None:
+    """Adds the list of all settings to the docstring of `Config`, with their defaults."""
+    if name != "keras_pendulum.Config":
+        return
+    lines.append("")
+    for field in fields(Config):
+        # Without a backslash, these characters begin emphasis or a link.
+        meaning = re.sub(r"([*|_\\])", r"\\\1", field.metadata["help"])
+        default = format_value(field.default)
+        lines.append(f":param {field.name}: {meaning}. Default: ``{default}``.")
+    lines.append("")
+
+
 def setup(app: Any) -> None:
-    """Connects the function above; Sphinx calls it."""
+    """Connects the functions above; Sphinx calls it."""
     app.connect("autodoc-process-signature", readable_signature)
+    app.connect("autodoc-process-docstring", add_settings)

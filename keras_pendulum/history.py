@@ -9,15 +9,15 @@ from typing import NamedTuple
 class EpisodeRecord(NamedTuple):
     """The results of one training episode; the columns of history.csv have the same names."""
 
-    episode: int  # from 0
-    average_reward: float  # per step
-    episode_return: float  # undiscounted sum of the rewards
-    epsilon: float  # at the last step
-    loss: float  # mean over the updates of the episode; NaN without updates
-    environment_steps: int  # since the start of the run
-    updates: int  # since the start of the run
-    seconds: float  # wall-clock time of the episode and its updates
-    greedy_regret: float = math.nan  # of the evaluation after the episode; NaN without one
+    episode: int  #: number of the episode, from 0
+    average_reward: float  #: mean reward per step
+    episode_return: float  #: undiscounted sum of the rewards
+    epsilon: float  #: ε at the last step
+    loss: float  #: mean loss of the updates of the episode; NaN without updates
+    environment_steps: int  #: environment steps since the start of the run
+    updates: int  #: updates since the start of the run
+    seconds: float  #: wall-clock time of the episode and its updates, in seconds
+    greedy_regret: float = math.nan  #: of the evaluation after the episode; NaN without one
 
     def line(self) -> str:
         """Returns the line that the original prints."""

@@ -47,6 +47,10 @@ class Config(Recording, Learning):  # in this order, the fields of Learning come
 
     Raises ConfigError, naming the setting, for a value outside its range, and for a value of a
     setting that has no effect with the others.
+
+    >>> config = kp.preset("reference", seed=3, hidden_units=(64, 64))
+    >>> config.hidden_units, config.total_updates
+    ((64, 64), 18360)
     """
 
     def __post_init__(self) -> None:

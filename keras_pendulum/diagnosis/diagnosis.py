@@ -37,7 +37,7 @@ class Diagnosis:
 
     measurement: Measurement
     findings: list[Finding]  #: the strongest first
-    notes: list[Finding]  #: what costs little
+    notes: list[Finding]  #: faults that cost little
     limits: list[str]  #: what could not be determined
     assumption: str = ""  #: says which task was assumed, for an agent that records none
 
@@ -134,6 +134,9 @@ def diagnose(
 
     Raises ConfigError for a gravity, discount or torques out of range and for CartPole, and as
     `evaluate_policy` does.
+
+    >>> [finding.name for finding in kp.diagnose("original").findings]
+    ['too-few-updates']
     """
     folder = find_run_if_folder(agent)
     record = None if folder is None else read_record(folder)

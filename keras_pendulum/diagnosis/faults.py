@@ -25,7 +25,8 @@ FAULTS: dict[str, Fault] = {
     "no-bootstrapping": Fault(
         "The values are the rewards of one step. The agent does not look ahead, so it cannot swing "
         "the pendulum up.",
-        "Add γ·max Q(next) to each target. The pendulum never terminates. Truncation is not an end.",
+        "Add γ·max Q(next) to each target. The pendulum never terminates. Truncation is not an "
+        "end.",
         ("too-few-updates", "reward-scale", "other-discount"),
     ),
     "other-discount": Fault(
@@ -122,9 +123,9 @@ FAULTS: dict[str, Fault] = {
 class Repair(NamedTuple):
     """A change of the agent without training."""
 
-    name: str
-    regret: float  # with the change
-    won: float  # in return
+    name: str  #: the change
+    regret: float  #: with the change
+    won: float  #: the return that the change gains
 
     def __str__(self) -> str:
         return f"{self.name}: regret {self.regret:.2f}"
@@ -134,10 +135,10 @@ class Repair(NamedTuple):
 class Finding:
     """A fault that the evidence shows."""
 
-    name: str
-    evidence: str
-    healthy: str  # the same figure of a healthy network
-    repair: Repair | None = None  # where there is one
+    name: str  #: of the fault, such as `too-few-updates`
+    evidence: str  #: the figure that shows the fault
+    healthy: str  #: the same figure of a healthy network
+    repair: Repair | None = None  #: the repair without training, where there is one
 
     @property
     def cost(self) -> float | None:

@@ -19,13 +19,18 @@ FINER_TORQUE_GAIN = 0.002
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """The undiscounted returns of whole episodes."""
+    """The undiscounted returns of whole episodes.
 
-    task: Task  #: that was played
-    returns: NDArray[np.float64]  #: [episodes]
-    optimal_returns: NDArray[np.float64]  #: [episodes]; with 41 torques; 500 for CartPole
+    >>> score = kp.evaluate_policy("cartpole", episodes=2)
+    >>> score.mean_return, score.regret
+    (500.0, 0.0)
+    """
+
+    task: Task  #: the task that was played
+    returns: NDArray[np.float64]  #: the return of each episode, [episodes]
+    optimal_returns: NDArray[np.float64]  #: the best possible ones, with 41 torques, [episodes]
     discount: float | None = None  #: γ that the policy learned with, where it is known
-    seeds: range | None = None  #: of the starts
+    seeds: range | None = None  #: the seeds of the starts
     assumption: str = ""  #: says which task was assumed, for an agent that records none
 
     @property
@@ -81,7 +86,7 @@ class Score:
 
     @property
     def learning_regret(self) -> float | None:
-        """The rest of the regret; negative where the policy is better than the exact one for γ."""
+        """The regret from learning; negative where the policy beats the exact one for γ."""
         cost = self.discount_regret
         return None if cost is None else self.regret - cost
 

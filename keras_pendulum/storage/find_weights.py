@@ -16,6 +16,9 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
     `name` is the file, the folder of a run, or a shipped file without `.h5`.
 
     Raises WeightsError when none of them exists.
+
+    >>> kp.find_weights("reference").name
+    'reference.h5'
     """
     name = os.fspath(name)
     if not name:

@@ -40,6 +40,10 @@ def load_weights(path: str | os.PathLike[str], activation: str | None = None) ->
 
     Raises WeightsError when the file is missing or damaged, does not hold such a network, or
     records another activation.
+
+    >>> network = kp.load_weights("reference")
+    >>> network.hidden_units, network.action_count, network.activation
+    ((512, 256, 128), 41, 'tanh')
     """
     require_type("path", path, (str, os.PathLike))
     if activation is not None and activation not in ACTIVATIONS:

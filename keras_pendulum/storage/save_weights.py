@@ -36,6 +36,10 @@ def save_weights(
         evaluated_return: the mean return of `evaluate_policy(network)`, one more attribute.
 
     Raises UserError when the file cannot be written, or when `load_weights` would reject it.
+
+    >>> kp.save_weights(kp.DQN((64, 64), 5), "mine.h5")
+    >>> kp.load_weights("mine.h5").hidden_units
+    (64, 64)
     """
     require_type("network", network, DQN)
     require_type("path", path, (str, os.PathLike))

@@ -33,7 +33,7 @@ class TrainingResult:
     network: DQN  #: the network after the last update
     history: list[EpisodeRecord]  #: one record per episode, with the names of history.csv's columns
     finished: bool  #: false where `should_stop` ended the run before its last episode
-    score: Score | None = None  #: greedy, of a finished run with a folder, for the picture's title
+    score: Score | None = None  #: of the greedy policy; None without a folder or unfinished
 
 
 def train_dqn(
@@ -76,6 +76,10 @@ def train_dqn(
             meanwhile; this process is a fork of one with TensorFlow; or an observation, a reward,
             a loss or a weight is not finite. The last checkpoint then holds finite weights.
         TypeError: `config` is not a Config, or `init` not a DQN.
+
+    >>> result = kp.train_dqn(kp.preset(episodes=2))  # too few for an update
+    >>> [record.updates for record in result.history], result.finished
+    ([0, 0], True)
     """
     require_type("config", config, Config)
     if init is not None:

@@ -30,7 +30,9 @@ def test_every_finding_has_a_section() -> None:
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_section_has_the_sentences_of_the_finding(name: str) -> None:
-    found = re.search(rf"^### {name}\n\n(.*?)\n\nWhat to do: (.*?)\n(?:\n|\Z)", DIAGNOSE, re.M | re.S)
+    found = re.search(
+        rf"^### {name}\n\n(.*?)\n\nWhat to do: (.*?)\n(?:\n|\Z)", DIAGNOSE, re.M | re.S
+    )
     assert found is not None
     explanation, remedy = (" ".join(text.split()) for text in found.groups())
     fault = TEXTS[name]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import inspect
 import os
 import re
 from pathlib import Path
@@ -46,8 +47,13 @@ def shortened(example: str) -> str:
 
 
 @pytest.mark.parametrize("name", kp.__all__)
-def test_examples_of_a_docstring_print_what_they_show(name: str) -> None:
+def test_examples_of_a_docstring_print_what_they_show(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     value = getattr(kp, name)
+    if inspect.isfunction(value):
+        assert ">>> " in (value.__doc__ or ""), "a public function has an example"
     for test in doctest.DocTestFinder(recurse=False).find(value, name, globs={"kp": kp}):
         require_output(test)
 
