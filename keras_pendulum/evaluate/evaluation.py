@@ -44,14 +44,16 @@ def evaluate_policy(
     """Returns the score of greedy episodes; episode i starts from `reset(seed=seed+i)`.
 
     Args:
-        agent: a network, its policy, the path or shipped name of its file, a Keras model, a
-            function from observation to torque, a `q_function`, or an object with `predict`.
+        agent: a network, its policy, the path or shipped name of its file, a run folder, a Keras
+            model, a function from an observation to a torque in N·m or to an index of `torques`, a
+            `q_function`, or an object with `predict`.
         episodes: number of episodes.
         seed: seed of the first start.
         gravity: m/s², for the pendulum; None takes the agent's recorded gravity, else the better
             one of 10 and 1, and the summary says so.
         discount: γ that the agent learned with; None takes the recorded one, if there is one.
-        torques: N·m, what the agent's outputs stand for; None takes `linspace(-2, 2, A)`.
+        torques: N·m, what the agent's outputs or indices stand for; None takes
+            `linspace(-2, 2, A)` for outputs.
         render_mode: Gymnasium's.
         on_step: called with the environment after each reset and each step.
         on_progress: called at each step with the share of all steps that is done, 0 to 1.

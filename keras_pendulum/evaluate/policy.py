@@ -18,7 +18,7 @@ Observations = NDArray[np.float32]  # [B, D]
 
 
 class Policy(ABC):
-    """Whatever acts. `load_policy` returns one, and so does `as_policy` for any other agent.
+    """An agent that acts. `load_policy` and `q_function` return one.
 
     A policy of a network has a copy of the weights, so later updates do not change it.
 
@@ -27,8 +27,8 @@ class Policy(ABC):
         info: the recorded run that the policy comes from.
         actions: what the outputs of its Q-network stand for; None where it has none.
         has_q_values: whether `q_values` returns values.
-        one_by_one: whether one episode is played after the other, because the policy may have a
-            state, or is faster with one observation than in a batch.
+        one_by_one: whether one episode is played after the other. The policy may have a state, or
+            it is faster with one observation than with a batch.
     """
 
     has_q_values = False

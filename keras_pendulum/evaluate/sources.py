@@ -30,7 +30,7 @@ def load_policy(source: DQN | str | os.PathLike[str], activation: str | None = N
     """Returns the greedy policy of a network.
 
     Args:
-        source: the path or shipped name of a weights file, or a DQN.
+        source: the path or shipped name of a weights file, a run folder, or a DQN.
         activation: of a file that records none, see `load_weights`.
 
     Raises WeightsError as `load_weights` does, and UserError when a weight is not finite.

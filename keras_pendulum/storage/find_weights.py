@@ -13,7 +13,7 @@ from keras_pendulum.storage.shipped_weights import shipped_folder, shipped_names
 def find_weights(name: str | os.PathLike[str]) -> Path:
     """Returns the path of a weights file.
 
-    `name` is the file, the folder of a run, or a shipped file without `.h5`.
+    `name` is the file, a run folder, or the name of a shipped file.
 
     Raises WeightsError when none of them exists.
 

@@ -34,7 +34,7 @@ def load_weights(path: str | os.PathLike[str], activation: str | None = None) ->
     and in a whole model the activations.
 
     Args:
-        path: the file, or the name of a shipped one.
+        path: the file, a run folder, or the name of a shipped file.
         activation: tanh, relu or linear, of the hidden layers, for a file that holds weights alone.
             Without it, and without a recorded one, they are tanh, with a warning.
 
