@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 class Fault(NamedTuple):
     """The explanation and the remedy of a fault."""
 
-    explanation: str  # two or three sentences
+    explanation: str  # two sentences
     remedy: str
     explains: tuple[str, ...] = ()  # other faults: what shows them is a trace of this one
 
@@ -36,9 +36,8 @@ FAULTS: dict[str, Fault] = {
         ("too-few-updates", "reward-scale"),
     ),
     "reward-scale": Fault(
-        "The values are those of rewards with another size. Large rewards need larger outputs than "
-        "the network reaches in time. Small rewards are smaller than the noise of its initial "
-        "weights.",
+        "The values are those of rewards with another size. Large ones need larger outputs than "
+        "the network reaches in time, and small ones are below the noise of its initial weights.",
         "Scale the rewards so that the values are between 1 and 100 in size.",
         ("too-few-updates",),
     ),
@@ -147,7 +146,7 @@ class Finding:
 
     @property
     def explanation(self) -> str:
-        """The explanation of the fault, in two or three sentences."""
+        """The explanation of the fault, in two sentences."""
         return FAULTS[self.name].explanation
 
     @property
