@@ -35,8 +35,8 @@ def write_atomically(
     if not os.fspath(path):
         raise UserError("the name of the file is empty")
     target = Path(os.path.realpath(path))
-    # Few digits, because Windows limits the length of a path.
-    temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.tmp")
+    # Few digits and letters, because systems limit the length of a name, and Windows that of a path.
+    temporary = target.with_name(f".{target.name[:60]}.{uuid.uuid4().hex[:8]}.tmp")
     try:
         if Path(path).exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "a device, a pipe or a socket"

@@ -24,7 +24,7 @@ LONG = "n" * 250
         ("train", ("--ep", "3"), "did you mean --episodes?"),
         ("evaluate", ("",), "the name of the weights file is empty"),
         ("evaluate", (LONG,), "no such file"),
-        ("page", ("reference", "--out", f"{LONG}.html"), "File name too long"),
+        ("page", ("reference", "--out", f"{LONG * 2}.html"), "File name too long"),
         ("evaluate", ("reference", "--gif", "no/a.gif"), "there is no folder no"),
         ("page", ("reference", "--out", "no/a.html"), "there is no folder no"),
         ("train", ("--init", "cartpole"), "holds a network for CartPole-v1 with the activation"),
@@ -51,6 +51,12 @@ def test_empty_names_are_refused_in_python(tmp_path: Path, monkeypatch: pytest.M
         with pytest.raises(kp.UserError, match="is empty"):
             use()
     assert not list(tmp_path.iterdir())
+
+
+def test_name_of_the_greatest_length_is_written(tmp_path: Path) -> None:
+    path = tmp_path / f"{LONG}.h5"
+    kp.save_weights(kp.DQN((4,)), path)
+    assert kp.load_weights(path).hidden_units == (4,)
 
 
 def test_name_of_another_format_is_refused(tmp_path: Path) -> None:

@@ -13,10 +13,11 @@ from keras_pendulum.study.job import Job, decode, installed_versions, train_and_
 
 def test_command_function_and_study_make_the_same_run(tmp_path: Path, command: Command) -> None:
     """Networks of full size, because small ones never compute on several threads."""
-    flags = ("--seed", "7", "--episodes", "50", "--out", "run", "--quiet")
-    result = command("train", *flags)
+    settings = {"seed": 7, "episodes": 5, "warmup_episodes": 3}
+    flags = [f"--{name.replace('_', '-')}={value}" for name, value in settings.items()]
+    result = command("train", *flags, "--out", "run", "--quiet")
     assert result.returncode == 0, result.stderr
-    config = kp.preset(seed=7, episodes=50)
+    config = kp.preset("reference", **settings)
     network = kp.train_dqn(config).network
     trained = kp.load_weights(tmp_path / "run").get_weights()
     for mine, of_the_command in zip(network.get_weights(), trained, strict=True):
