@@ -35,7 +35,7 @@ def write_atomically(
     if not os.fspath(path):
         raise UserError("the name of the file is empty")
     target = Path(os.path.realpath(path))
-    # Few digits and letters, because systems limit the length of a name, and Windows that of a path.
+    # Short, because systems limit the length of a name, and Windows that of a path.
     temporary = target.with_name(f".{target.name[:60]}.{uuid.uuid4().hex[:8]}.tmp")
     try:
         if Path(path).exists() and not target.is_file():

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import Command
@@ -83,7 +84,7 @@ def test_code_that_exits_is_an_error(
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_training_in_a_fork_is_refused() -> None:
     """TensorFlow's threads are not in the fork, and its operations would wait for them."""
-    context = multiprocessing.get_context("fork")
+    context: Any = multiprocessing.get_context("fork")
     queue = context.Queue()
 
     def train() -> None:
@@ -100,7 +101,7 @@ def test_training_in_a_fork_is_refused() -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_fork_loads_and_evaluates() -> None:
-    context = multiprocessing.get_context("fork")
+    context: Any = multiprocessing.get_context("fork")
     queue = context.Queue()
     process = context.Process(
         target=lambda: queue.put(kp.evaluate_policy("reference", episodes=1).regret)
