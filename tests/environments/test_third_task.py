@@ -77,6 +77,7 @@ def corridor(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     del gymnasium.registry["Corridor-v0"]
 
 
+@pytest.mark.slow
 def test_third_task_is_trained_evaluated_resumed_and_compared(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
