@@ -56,6 +56,12 @@ class OneLineParser(argparse.ArgumentParser):
             message += f"; a value that begins with a minus needs {flag}=VALUE"
         self.exit(2, f"error: {one_line(message)}\n")
 
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """Prints a message to standard error and exits."""
+        if message:
+            self._print_message(message, sys.stderr)
+        raise _ParserExit(status)
+
     def parse_args(self, *words: Any) -> Any:  # type: ignore[override]
         """Parses the command line; prints completions and exits where a shell asks for them."""
         _prepare_output()
@@ -84,6 +90,10 @@ class OneLineParser(argparse.ArgumentParser):
         ]
         flags = [word.partition("=")[0] for word in words if word.startswith("-")]
         return did_you_mean(flags[0], known) if flags else ""
+
+
+class _ParserExit(SystemExit):
+    """The end of a command after its help or an error of its arguments."""
 
 
 class _HelpAll(argparse.Action):
@@ -141,6 +151,11 @@ def run_command(command: Callable[[], int]) -> int:
         return status
     except UserError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except _ParserExit:
+        raise
+    except SystemExit as error:
+        print(f"error: the agent's code exits (SystemExit: {error.code})", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130

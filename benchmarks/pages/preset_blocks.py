@@ -53,7 +53,8 @@ def first_run() -> str:
     seconds = row_of("quality", preset="`reference`")["whole command"]
     # The training evaluates its policy in the same words, and then names random actions.
     lines = printed_by("evaluate reference") + printed_by("train")
-    return f"Installed, it trains in {seconds} on two cores and ends with:\n\n{fenced(lines)}"
+    begin = f"Installed, it trains in {seconds} on two cores and prints, among other lines:"
+    return f"{begin}\n\n{fenced(lines)}"
 
 
 def diagnosis() -> str:

@@ -50,12 +50,12 @@ def _compare(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     require_no_other_file(Path(arguments.out), b"\x89PNG", "a PNG")
     require_ending("--out", arguments.out, ".png")
-    run_folders = _find_runs(arguments.folders)
 
     with fast_import():
         from keras_pendulum.compare.figure import draw_comparison
         from keras_pendulum.compare.runs import best_possible, load_runs
 
+    run_folders = _find_runs(arguments.folders)
     with status("Evaluating the runs"):
         runs = load_runs(run_folders)
     write_atomically(arguments.out, draw_comparison(runs, best_possible(runs)))

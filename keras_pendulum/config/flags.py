@@ -9,7 +9,7 @@ from typing import Any
 from keras_pendulum.cli import OneLineParser
 from keras_pendulum.completion import complete_with, names
 from keras_pendulum.config.config import Config, Recording
-from keras_pendulum.config.fields import Switch, Text, format_value, kind_of
+from keras_pendulum.config.fields import Integers, Switch, Text, format_value, kind_of
 from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.config.settings import RENAMED, parse_setting
 
@@ -36,7 +36,7 @@ def add_config_flags(parser: OneLineParser) -> None:
     for spec in fields(Config):
         if spec.name != "preset":
             kind = kind_of(spec)
-            options: dict[str, Any] = {"metavar": "N"}
+            options: dict[str, Any] = {"metavar": "N,N,…" if isinstance(kind, Integers) else "N"}
             if isinstance(kind, Text) and kind.choices:
                 options = {"choices": kind.choices}
             elif isinstance(kind, Switch):  # without a value it is true

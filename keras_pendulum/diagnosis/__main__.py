@@ -14,6 +14,7 @@ from keras_pendulum.cli import (
     add_torques_flag,
     nonempty_path,
     prints_to_stderr,
+    require_ending,
     run_command,
 )
 from keras_pendulum.completion import complete_with, weights_files
@@ -58,6 +59,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 def _diagnose(arguments: argparse.Namespace) -> int:
     require_tensorflow()
     if arguments.report:
+        require_ending("--report", arguments.report, ".html")
         require_no_other_file(Path(arguments.report), b"<!DOCTYPE html>", "an HTML file")
 
     with fast_import():
@@ -80,6 +82,8 @@ def _diagnose(arguments: argparse.Namespace) -> int:
     if arguments.report:
         write_atomically(arguments.report, as_html(diagnosis).encode())
     print(text)
+    if arguments.report and not arguments.json:
+        print(f"Wrote {arguments.report}")
     return 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ from keras_pendulum.storage.run_folder import find_run_if_folder
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BARE_POLICY = "the agent has no Q-values, so only repairs could be tried"
+_BARE_POLICY = "without Q-values, faults of the training cannot be seen"
 _NO_RUN = (
     "learning rate, exploration and forgetting leave no sure trace in a network: diagnose the run "
     "folder for them"
@@ -39,7 +40,7 @@ class Diagnosis:
     findings: list[Finding]  #: the strongest first
     notes: list[Finding]  #: faults that cost little
     limits: list[str]  #: what could not be determined
-    assumption: str = ""  #: says which task was assumed, for an agent that records none
+    assumptions: Sequence[str] = ()  #: say what was assumed of an agent that records less
 
     @property
     def verdict(self) -> str:
@@ -47,13 +48,17 @@ class Diagnosis:
         measurement = self.measurement
         regret = f"regret {measurement.regret:.2f}"
         if not self.findings:
-            discount_cost = measurement.discount_cost
-            little = measurement.regret_tolerance - discount_cost
-            allowed = f"the discount alone costs {discount_cost:.2f}, and up to {little:.1f} more "
-            allowed += "is little"
-            if measurement.regret <= measurement.regret_tolerance:
-                return f"No finding: {regret}; {allowed}."
-            return f"No finding, but {regret}; {allowed}: train for longer."
+            little, cost = measurement.regret_tolerance, measurement.discount_cost
+            allowed = f"Up to {little:.1f} counts as small: {cost:.2f} from the discount, and "
+            allowed += f"{little - cost:.1f} of tolerance"
+            if measurement.regret <= little:
+                return f"No finding: {regret}. {allowed}."
+            if not measurement.policy.has_q_values:
+                return (
+                    f"Undetermined: {regret}. {allowed}. The agent gives no Q-values, so only "
+                    "repairs were tried: give them with kp.q_function (docs/agents.md)."
+                )
+            return f"No finding, but {regret}. {allowed}. Train for longer."
         first = self.findings[0]
         cost = "" if first.cost is None else f"; without it {first.cost:.1f} more return"
         return f"{first.name}: {first.evidence} (healthy: {first.healthy}); {regret}{cost}."
@@ -66,7 +71,7 @@ class Diagnosis:
             f"Agent {measurement.policy.name}, g = {measurement.task.gravity:g}, "
             f"γ = {measurement.discount:g}, {STARTS} starts; "
             f"the discount alone costs {measurement.discount_cost:.2f}.",
-            *([f"{self.assumption}."] if self.assumption else []),
+            *(f"{sentence}." for sentence in self.assumptions),
         ]
         for number, finding in enumerate(self.findings, 1):
             lines += ["", f"{number}. {finding.name}", f"   Evidence: {finding.evidence}"]
@@ -96,6 +101,7 @@ class Diagnosis:
             "findings": [finding.as_json() for finding in self.findings],
             "notes": [finding.as_json() for finding in self.notes],
             "limits": self.limits,
+            "assumptions": list(self.assumptions),
             "signals": {
                 name: value if math.isfinite(value) else None
                 for name, value in _signals(measurement).items()
@@ -129,7 +135,8 @@ def diagnose(
             used, too).
         gravity: declared g in m/s²; None takes the recorded one, else the better one of 10 and 1,
             and the summary says so.
-        discount: declared γ; None takes the recorded one, else 0.9.
+        discount: declared γ; None takes the recorded one, else 0.9, and the
+            summary says so.
         torques: N·m of the outputs, as in `evaluate_policy`.
 
     Raises ConfigError for a gravity, discount or torques out of range and for CartPole, and as
@@ -143,13 +150,18 @@ def diagnose(
     policy = as_policy(agent if folder is None else folder.weights, torques)
     require_pendulum(policy.task, policy.name, "diagnose is for Pendulum-v1")
     task, assumption = find_task(policy, gravity)
+    sentences = [assumption] if assumption else []
     assert isinstance(task, Pendulum)
-    if discount is None:
-        discount = policy.info.discount
-    discount = Config.discount if discount is None else Number(0, 1).validate("discount", discount)
+    if discount is None and (discount := policy.info.discount) is None:
+        discount = Config.discount
+        sentences.append(
+            f"The agent records no discount. {discount:g} was assumed: declare yours with "
+            "discount= (--discount)"
+        )
+    discount = Number(0, 1).validate("discount", discount)
     scale = policy.info.reward_scale
     diagnosis = diagnose_measurement(Measurement(policy, task, discount, scale, record))
-    return replace(diagnosis, assumption=assumption)
+    return replace(diagnosis, assumptions=sentences)
 
 
 def diagnose_measurement(measurement: Measurement) -> Diagnosis:

@@ -80,7 +80,7 @@ FAULTS: dict[str, Fault] = {
         ("too-few-updates", "no-bootstrapping", "narrow-starts"),
     ),
     "other-gravity": Fault(
-        "The values fit another gravity much better than the declared one. The agent learned a "
+        "The values or the stored transitions are those of another gravity. The agent learned a "
         "different pendulum.",
         "Train at the gravity at which you evaluate, or declare the one of the training.",
     ),
@@ -111,10 +111,10 @@ FAULTS: dict[str, Fault] = {
         "Make the learning rate smaller, and let it fall to 0 at the end.",
     ),
     "undetermined": Fault(
-        "The values are wrong, but no single fault explains them. Several faults of the training "
-        "cause the same network.",
-        "Look at the loss and the return over the run. Of a run of this package, diagnose the "
-        "folder: its history and replay buffer are used, too.",
+        "The values or advantages are wrong. No single fault explains them, because several faults "
+        "of the training cause the same network.",
+        "Look at the loss and the return over the run. With a run folder of this package, diagnose "
+        "uses its history and replay buffer, too.",
     ),
 }
 

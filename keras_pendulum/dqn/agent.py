@@ -81,8 +81,8 @@ class Agent:
         return loss
 
     def average_weights(self) -> None:
-        """Replaces the online weights by their moving average, if the optimizer has one."""
-        if self.optimizer.iterations > 0:  # the average begins with the first update
+        """Replaces the online weights by the optimizer's moving average, without its beginning."""
+        if self.optimizer.ema_momentum ** int(self.optimizer.iterations) < 1e-3:
             self.optimizer.finalize_variable_values(self.online.trainable_variables)
             self.policy = greedy_policy(self.online)
 

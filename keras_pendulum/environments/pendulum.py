@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -96,13 +97,11 @@ class Pendulum(Task):
 
 def validate_gravity(gravity: float) -> float:
     """Returns the gravity in m/s² as a float. Raises ConfigError unless it is 0 to 100."""
-    try:
-        number = float(gravity)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not 0 <= number <= LARGEST_GRAVITY:  # written so that NaN fails too
-        raise ConfigError(f"gravity is {gravity!r}; expected a number from 0 to 100 (m/s²)")
-    return number + 0.0  # -0.0 becomes 0.0
+    is_number = isinstance(gravity, numbers.Real) and not isinstance(gravity, bool)
+    if not is_number or not 0 <= gravity <= LARGEST_GRAVITY:  # written so that NaN fails too
+        found = repr(gravity)[:50]
+        raise ConfigError(f"gravity is {found}; expected a number from 0 to 100 (m/s²)")
+    return float(gravity) + 0.0  # -0.0 becomes 0.0
 
 
 def require_pendulum(task: Task, what: str, expected: str = "expected Pendulum-v1") -> Pendulum:

@@ -31,9 +31,9 @@ def call_agent(function: Callable[..., Any], *values: Any, **options: Any) -> An
     """Returns what the user's function returns; its exception becomes an ActionError."""
     try:
         return function(*values, **options)
-    except UserError:
+    except (UserError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         raise ActionError(f"the agent {failure(error)}") from error
 
 
@@ -50,7 +50,9 @@ def failure(error: BaseException) -> str:
 def torques_of(answer: Any, batch: Batch) -> NDArray[np.float64]:
     """Returns the torques in N·m of the shape `batch`. Raises ActionError for anything else."""
     each = f" for each of {batch[0]} observations" if batch else ""
-    numbers = _numbers(answer, batch, f"expected a torque in N·m{each}")
+    numbers = _numbers(
+        answer, batch, f"expected a torque in N·m{each}; for Q-values, give kp.q_function(…)"
+    )
     if numbers.dtype.kind in "iu":
         raise _wrong(
             f"the integer {numbers.flat[0]}",

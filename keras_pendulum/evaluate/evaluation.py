@@ -86,15 +86,19 @@ def evaluate_policy(
 
 
 def find_task(policy: Policy, gravity: float | None) -> tuple[Task, str]:
-    """Returns the task of a policy, and a sentence where it is assumed.
+    """Returns the task of a policy, and a sentence where it is assumed or not the recorded one.
 
     For a policy that records no task, without a declared gravity in m/s², it is the usual one at
     which the policy gains most of what can be gained over random torques.
 
     Raises ConfigError for a gravity out of range, or where the task has none.
     """
-    if policy.info.task is not None or gravity is not None:
-        return policy.task.with_gravity(gravity), ""
+    recorded = policy.info.task
+    if recorded is not None or gravity is not None:
+        task = policy.task.with_gravity(gravity)
+        if recorded in (None, task):
+            return task, ""
+        return task, f"The agent records {recorded.name}, and is evaluated on {task.name}"
     seeds = range(_STARTS_OF_A_TRIAL)
     gained = {}
     for task in map(Pendulum, USUAL_GRAVITIES):

@@ -68,7 +68,9 @@ def _load_code(word: str) -> Any:
         raise UserError(f"{place}: no such file; expected FILE.py:NAME")
     try:
         module = _run_file(Path(place)) if is_file else importlib.import_module(place)
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         missing = isinstance(error, ModuleNotFoundError) and f"{place}.".startswith(
             f"{error.name}."
         )

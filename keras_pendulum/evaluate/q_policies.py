@@ -79,7 +79,19 @@ class QPolicy(Policy):
         count = q_values_of(call_agent(function, _EXAMPLES), len(_EXAMPLES)).shape[1]
         super().__init__(name)
         self.actions: Actions = torque_actions(torques, count)
+        self._declared = torques is not None
         self._function = function
+
+    def with_torques(self, torques: ArrayLike) -> QPolicy:
+        """Returns the policy with other torques (N·m) for its outputs.
+
+        Raises ConfigError for torques that do not fit, and where it has others.
+        """
+        if self._declared:
+            raise ConfigError(f"torques are given twice: {self.name} has torques of its own")
+        changed = copy.copy(self)
+        changed.actions = torque_actions(torques, self.actions.count)
+        return changed
 
     def q_values(self, observations: ArrayLike) -> NDArray[Any]:
         """Returns the Q-values [B, A] of observations [B, 3].

@@ -105,6 +105,7 @@ class Score:
             "discount": self.discount,
             "discount_regret": self.discount_regret,
             "learning_regret": self.learning_regret,
+            **({"assumption": self.assumption} if self.assumption else {}),
         }
 
     def summary(self) -> str:
@@ -129,10 +130,10 @@ class Score:
         ]
         cost, rest = self.discount_regret, self.learning_regret
         if cost is not None and rest is not None:
-            part = f"the other {rest:.2f} are left to learning"
+            part = f"Regret from learning: {rest:.2f}"
             if rest < 0:
-                part = f"this policy is better by {-rest:.2f}"
+                part = f"This policy is better by {-rest:.2f}"
             lines.append(
-                f"Exact policy for the discount {self.discount:g}: regret {cost:.2f}; {part}"
+                f"Exact policy for the discount {self.discount:g}: regret {cost:.2f}. {part}"
             )
         return "\n".join(lines)

@@ -62,6 +62,8 @@ def _write(arguments: argparse.Namespace) -> int:
         _require_browser()
 
     with fast_import():
+        from keras_pendulum.evaluate.evaluation import find_task
+        from keras_pendulum.evaluate.sources import load_policy
         from keras_pendulum.page.build import build_page
         from keras_pendulum.page.training import training_content
         from keras_pendulum.storage.find_weights import find_weights
@@ -76,8 +78,11 @@ def _write(arguments: argparse.Namespace) -> int:
     if arguments.against is not None:
         other = find_weights(arguments.against)  # also the folder of a run
         against = (load_weights(other), other)
+    task, assumption = find_task(load_policy(network), arguments.gravity)
+    if assumption and arguments.gravity is None:
+        print(assumption)
     with status("Computing the optimum for the page"):
-        page = build_page(network, path, arguments.gravity, against, training, name)
+        page = build_page(network, path, task.gravity, against, training, name)
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")

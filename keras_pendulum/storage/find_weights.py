@@ -37,9 +37,12 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
     if path.is_dir():
         files = sorted(file.name for file in path.glob("*.h5"))
         example = f", such as {path / files[0]}" if files else ""
-        raise WeightsError(f"{name}: a folder; expected a weights file (.h5){example}")
+        raise WeightsError(
+            f"{name}: a folder without a run; expected a weights file (.h5){example}"
+        )
     problem = "not a file" if path.exists() else "no such file"
-    meant = did_you_mean(name, shipped_names())
+    beside = (str(each) for each in path.parent.glob("*"))
+    meant = did_you_mean(name, [*shipped_names(), *beside])
     raise WeightsError(f"{name}: {problem}; expected a weights file (.h5){meant}")
 
 

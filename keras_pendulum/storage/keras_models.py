@@ -27,6 +27,8 @@ from keras_pendulum.storage.model_config import read_model
 from keras_pendulum.storage.quarantine import open_h5
 
 _MEMBERS = {"config.json": 2**20, "metadata.json": 2**16, "model.weights.h5": 2**26}  # bytes
+_RECURRENT = (keras.layers.RNN, keras.layers.Bidirectional, keras.layers.TimeDistributed)
+_MOST_STEPS = 512  # of all recurrent layers together, each step of which takes time
 _LARGEST_OUTPUT = 16_384  # numbers for one observation, of each operation
 
 
@@ -108,6 +110,10 @@ def _require_sizes(text: str, stored: int, path: str) -> None:
         needed = sum(math.prod(weight.shape) for weight in model.weights)
         if needed > stored:
             refuse_model(path, f"its layers have {needed} weights, and the file has {stored}")
+        layers = model._flatten_layers() if hasattr(model, "_flatten_layers") else model.layers
+        steps = sum(each.input.shape[1] for each in layers if isinstance(each, _RECURRENT))
+        if steps > _MOST_STEPS:
+            refuse_model(path, f"its recurrent layers have {steps} steps, more than {_MOST_STEPS}")
         observation = tf.zeros((1, Pendulum().observation_size))
         model(observation, training=False)
         computed = {observation.ref()}  # from the observation

@@ -38,8 +38,8 @@ class RunFolder:
     """
 
     def __init__(self, path: str | os.PathLike[str], environment: str) -> None:
-        if not os.fspath(path):
-            raise UserError("the name of the run's folder is empty")
+        if not os.fspath(path) or "\0" in os.fspath(path):
+            raise UserError("the name of the run's folder is empty, or has a null character")
         self.path = Path(path)
         # The real path: a link that changes during the run must not change the folder.
         self._real_path = Path(os.path.realpath(path))

@@ -43,7 +43,7 @@ def save_weights(
     """
     require_type("network", network, DQN)
     require_type("path", path, (str, os.PathLike))
-    if os.fspath(path).lower().endswith(".keras"):
+    if Path(path).suffix.lower() == ".keras":
         raise UserError(f"{path}: this writes HDF5, not a .keras file; name it FILE.h5")
     content = encode_weights(network, network.get_weights(), evaluated_return=evaluated_return)
 

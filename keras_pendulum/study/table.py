@@ -89,8 +89,7 @@ def as_markdown(rows: Sequence[Row]) -> str:
         + "\n\nRegret: the best possible mean return on 100 fixed starts minus the greedy mean "
         "return; its interquartile mean over the runs, with a 95 % bootstrap interval. "
         "Better than: the share of pairs of runs in which this arm's run has less regret than the "
-        "named arm's. Discount alone: the regret of the exact policy for the arm's discount; the "
-        "rest is left to learning.\n"
+        "named arm's. Discount alone: the regret of the exact policy for the arm's discount.\n"
     )
 
 

@@ -130,7 +130,10 @@ def test_results_can_be_compared_and_pickled() -> None:
 def test_regret_is_compared_with_what_the_discount_costs() -> None:
     healthy = kp.diagnose("reference").verdict
     assert "No finding: regret" in healthy
-    assert "the discount alone costs 0.25, and up to 8.8 more is little" in healthy
+    assert "Up to 9.1 counts as small: 0.25 from the discount, and 8.8 of tolerance." in healthy
+    bare = kp.diagnose(lambda observation: 0.0, gravity=1.0)
+    assert bare.verdict.startswith("Undetermined: ") and "kp.q_function" in bare.verdict
+    assert any("records no discount. 0.9 was assumed" in each for each in bare.assumptions)
 
 
 def test_picture_that_cannot_be_made_leaves_the_score(

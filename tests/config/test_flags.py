@@ -121,7 +121,7 @@ def test_mistyped_flag_is_refused_with_the_similar_one(
         ("episodes", "N", "[reference: 500, cartpole-original: 600]"),
         ("replay_capacity", "N", "[reference: 14000, original: 8000, cartpole-original: 10000]"),
         ("gravity", "N", "[reference: 1.0, cartpole-original: none]"),
-        ("hidden_units", "N", "[reference: 512,256,128, cartpole-original: 128,128]"),
+        ("hidden_units", "N,N,…", "[reference: 512,256,128, cartpole-original: 128,128]"),
         ("loss", "{squared,huber}", "[reference: squared, cartpole-original: huber]"),
         ("double_q", "[{true,false}]", "[reference: false]"),
     ],

@@ -79,7 +79,10 @@ def test_figure_is_drawn_without_q_values_too() -> None:
         (["{folder}"], "error: {folder}: holds no run (no pendulum_weight.h5"),
         (["{folder}/agents.py:Trainer"], "error: {folder}/agents.py:Trainer: agent is the class "),
         (["cartpole"], "error: cartpole belongs to CartPole-v1; diagnose is for"),
-        (["{weights}", "--report", "{weights}"], "error: {weights} holds something else than"),
+        (
+            ["{weights}", "--report", "{weights}"],
+            "error: --report is {weights}: expected a",
+        ),
     ],
 )
 def test_mistake_is_one_line(words: list[str], line: str, weights: Path, refusal: Refusal) -> None:

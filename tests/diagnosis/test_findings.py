@@ -68,7 +68,7 @@ def test_each_change_of_the_exact_values_is_named_first(fault: str, q_values: An
     [
         (
             0.5,
-            r"No finding, but regret .*; the discount alone .* is little: train for longer\.",
+            r"No finding, but regret .*: .* from the discount, and .* Train for longer\.",
         ),
         (0.3, r"undetermined: .*"),
     ],
@@ -120,7 +120,7 @@ def test_repair_shows_what_a_reversed_torque_map_costs() -> None:
 def test_bare_policy_is_diagnosed_by_repairs() -> None:
     diagnosis = diagnose_values(exact_values, share=-1.0, bare=True)
     assert first(diagnosis) == "torque-map"
-    assert diagnosis.limits == ["the agent has no Q-values, so only repairs could be tried"]
+    assert diagnosis.limits == ["without Q-values, faults of the training cannot be seen"]
     assert first(diagnose_values(exact_values, bare=True)) == "no finding"
 
 

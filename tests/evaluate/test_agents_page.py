@@ -21,7 +21,7 @@ def test_example_prints_a_regret(example: str, capsys: pytest.CaptureFixture[str
     found = re.search(r"Regret: ([\d.]+)", printed) or re.fullmatch(r"([\d.]+)\n", printed)
     assert found is not None
     assert 0 < float(found.group(1)) < 3000
-    assert ("left to learning" in printed) == ("discount=" in example or "SAC" in example)
+    assert ("Regret from learning" in printed) == ("discount=" in example or "SAC" in example)
 
 
 def test_page_has_an_example_for_each_library() -> None:

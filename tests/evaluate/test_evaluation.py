@@ -72,14 +72,14 @@ def test_regret_has_a_part_of_the_discount_and_one_of_learning() -> None:
     assert values["discount_regret"] + values["learning_regret"] == pytest.approx(values["regret"])
     assert score.summary().splitlines()[2:] == [
         "Regret: 2.00",
-        f"Exact policy for the discount 0.9: regret {cost:.2f}; the other {2 - cost:.2f} are left "
-        "to learning",
+        f"Exact policy for the discount 0.9: regret {cost:.2f}. Regret from "
+        f"learning: {2 - cost:.2f}",
     ]
     assert (
         score_with_discount(0.1)
         .summary()
         .splitlines()[3]
-        .endswith(f"regret {cost:.2f}; this policy is better by {cost - 0.1:.2f}")
+        .endswith(f"regret {cost:.2f}. This policy is better by {cost - 0.1:.2f}")
     )
 
 

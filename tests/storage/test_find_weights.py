@@ -23,13 +23,15 @@ def test_find_weights_returns_a_shipped_file_unless_the_current_folder_has_that_
     with pytest.raises(kp.WeightsError, match="folder/reference: no such file"):
         kp.find_weights("folder/reference")
     (tmp_path / "folder").mkdir()
-    with pytest.raises(kp.WeightsError, match=r"folder: a folder; expected .* \(\.h5\)$"):
+    with pytest.raises(kp.WeightsError, match=r"folder: a folder without a run; .* \(\.h5\)$"):
         kp.find_weights("folder")
     (tmp_path / "folder" / "mine.h5").touch()
     example = Path("folder", "mine.h5")
     with pytest.raises(
         kp.WeightsError,
-        match=re.escape(f"folder: a folder; expected a weights file (.h5), such as {example}"),
+        match=re.escape(
+            f"folder: a folder without a run; expected a weights file (.h5), such as {example}"
+        ),
     ):
         kp.find_weights("folder")
     (tmp_path / "folder" / "pendulum_weight.h5").touch()  # the folder of a run

@@ -23,6 +23,15 @@ def test_average_has_forgotten_the_initial_weights_at_the_end(
     assert 0 <= momentum <= 1 - 1 / average_updates
 
 
+def test_run_with_fewer_updates_than_planned_keeps_its_last_weights() -> None:
+    """The first updates wait for a full batch, so the average still holds the initial weights."""
+    config = kp.preset("cartpole", hidden_units=(8,), episodes=70, batch_size=1000)
+    runs = [kp.train_dqn(config.change(average_updates=each)) for each in (1, 1500)]
+    assert 0 < runs[0].history[-1].updates < config.total_updates / 2
+    for last, averaged in zip(*(run.network.get_weights() for run in runs), strict=True):
+        np.testing.assert_array_equal(last, averaged)
+
+
 @pytest.mark.parametrize("preset", ["cartpole", "swingup"])
 def test_presets_average_over_1500_updates(preset: str) -> None:
     assert kp.preset(preset).averaged_updates == kp.preset(preset).average_updates == 1500
