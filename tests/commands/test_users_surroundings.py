@@ -81,6 +81,27 @@ def test_code_that_exits_is_an_error(
     assert result.stderr.splitlines()[-1].startswith("error: ")
 
 
+@pytest.mark.parametrize(
+    "code",
+    [
+        "class A:\n    @property\n    def predict(self): raise SystemExit(0)\nagent = A()",
+        "class A:\n    def __array__(self): raise SystemExit(0)\ndef agent(o): return A()",
+        "def __getattr__(name): raise SystemExit(0)",
+        "import asyncio\ndef agent(observation): raise asyncio.CancelledError('stop')",
+        "raise BaseException('stop')",
+    ],
+    ids=["property", "answer", "module", "cancelled", "base"],
+)
+def test_code_that_ends_in_any_other_way_is_one_error_line(
+    code: str, tmp_path: Path, in_process: Command
+) -> None:
+    write(tmp_path, code)
+    result = in_process("evaluate", "mine.py:agent", "--episodes", "1")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert result.stderr.startswith("error: ")
+    assert result.stderr.count("\n") == 1
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_training_in_a_fork_is_refused() -> None:
     """TensorFlow's threads are not in the fork, and its operations would wait for them."""
