@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import errno
 import io
+import json
 import os
 import re
 import shlex
@@ -190,6 +191,14 @@ def prints_to_stderr() -> Iterator[None]:
             os.dup2(2, 1)
         with contextlib.redirect_stdout(sys.stderr):
             yield
+
+
+def print_json(value: dict[str, Any]) -> None:
+    """Prints an object. Later prints of this process, such as at its end, go to standard error."""
+    print(json.dumps(value), flush=True)
+    if sys.stdout is sys.__stdout__:
+        with contextlib.suppress(OSError):  # standard error is closed
+            os.dup2(2, 1)
 
 
 def _prepare_output() -> None:

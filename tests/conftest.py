@@ -179,8 +179,8 @@ def refusal(
     return error_line
 
 
-@pytest.fixture(scope="module")
-def no_picture() -> Iterator[None]:
+@contextlib.contextmanager
+def drawing_nothing() -> Iterator[None]:
     """Draws nothing after a run, which takes a second: its picture is a few bytes."""
     with pytest.MonkeyPatch.context() as patched:
         # The optimum of another number of steps takes many seconds.
@@ -189,6 +189,13 @@ def no_picture() -> Iterator[None]:
         )
         patched.setattr("keras_pendulum.optimum.phase_plane.run_phase_planes", lambda *run: {})
         patched.setattr("keras_pendulum.figures.run_figure.draw_run", lambda *run: b"a picture")
+        yield
+
+
+@pytest.fixture(scope="module")
+def no_picture() -> Iterator[None]:
+    """Draws nothing in all tests of a file, from the first that names it."""
+    with drawing_nothing():
         yield
 
 

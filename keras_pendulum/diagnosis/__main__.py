@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,6 +12,7 @@ from keras_pendulum.cli import (
     OneLineParser,
     add_torques_flag,
     nonempty_path,
+    print_json,
     prints_to_stderr,
     require_ending,
     run_command,
@@ -78,11 +78,14 @@ def _diagnose(arguments: argparse.Namespace) -> int:
             diagnosis = diagnose(
                 agent, gravity=arguments.gravity, discount=arguments.discount, torques=torques
             )
-            text = json.dumps(diagnosis.as_json()) if arguments.json else diagnosis.summary()
+            content, summary = diagnosis.as_json(), diagnosis.summary()
     if arguments.report:
         write_atomically(arguments.report, as_html(diagnosis).encode())
-    print(text)
-    if arguments.report and not arguments.json:
+    if arguments.json:
+        print_json(content)
+        return 0
+    print(summary)
+    if arguments.report:
         print(f"Wrote {arguments.report}")
     return 0
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from keras_pendulum.cli import (
     OneLineParser,
     add_activation_flag,
     add_torques_flag,
+    print_json,
     prints_to_stderr,
     run_command,
 )
@@ -102,7 +102,7 @@ def _evaluate(arguments: argparse.Namespace) -> int:
             shown = Path(policy.name).stem if Path(policy.name).is_file() else policy.name
             make_films(arguments, policy, score.task, shown)
     if arguments.json:
-        print(json.dumps({"weights": policy.name, **score.as_json()}))
+        print_json({"weights": policy.name, **score.as_json()})
     else:
         print(score.summary())
     return 0

@@ -47,7 +47,7 @@ def test_json_is_all_of_the_output(
 
 def test_json_of_a_process_is_all_of_the_output(tmp_path: Path, command: Command) -> None:
     """Matplotlib's backend of another environment, an output in ASCII, and a noisy child."""
-    write(tmp_path, NOISY)
+    write(tmp_path, NOISY + "import atexit\natexit.register(print, 'the end')\n")
     surroundings = {
         "MPLBACKEND": "module://nowhere.backend",
         "LC_ALL": "C",
@@ -59,6 +59,7 @@ def test_json_of_a_process_is_all_of_the_output(tmp_path: Path, command: Command
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["agent"] == "mine.py:agent"
     assert "loaded" in result.stderr
+    assert "the end" in result.stderr
 
 
 @pytest.mark.parametrize("name", ["evaluate", "diagnose"])
