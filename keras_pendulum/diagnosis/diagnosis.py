@@ -48,9 +48,9 @@ class Diagnosis:
         measurement = self.measurement
         regret = f"regret {measurement.regret:.2f}"
         if not self.findings:
-            little, cost = measurement.regret_tolerance, measurement.discount_cost
-            allowed = f"Up to {little:.1f} counts as small: {cost:.2f} from the discount, and "
-            allowed += f"{little - cost:.1f} of tolerance"
+            little, by_discount = measurement.regret_tolerance, measurement.discount_cost
+            allowed = f"Up to {little:.1f} counts as small: {by_discount:.2f} from the discount, "
+            allowed += f"and {little - by_discount:.1f} of tolerance"
             if measurement.regret <= little:
                 return f"No finding: {regret}. {allowed}."
             if not measurement.policy.has_q_values:
