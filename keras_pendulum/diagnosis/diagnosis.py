@@ -17,7 +17,7 @@ from keras_pendulum.diagnosis.measurement import STARTS, Measurement
 from keras_pendulum.diagnosis.repairs import find_by_repairs
 from keras_pendulum.diagnosis.run_record import read_record
 from keras_pendulum.diagnosis.states import observe
-from keras_pendulum.environments.pendulum import Pendulum, require_pendulum
+from keras_pendulum.environments.pendulum import require_pendulum
 from keras_pendulum.evaluate.evaluation import find_task
 from keras_pendulum.evaluate.sources import as_policy
 from keras_pendulum.storage.run_folder import find_run_if_folder
@@ -148,10 +148,9 @@ def diagnose(
     folder = find_run_if_folder(agent)
     record = None if folder is None else read_record(folder)
     policy = as_policy(agent if folder is None else folder.weights, torques)
-    require_pendulum(policy.task, policy.name, "diagnose is for Pendulum-v1")
-    task, assumption = find_task(policy, gravity)
+    found, assumption = find_task(policy, gravity)
+    task = require_pendulum(found, policy.name, "diagnose is for Pendulum-v1")
     sentences = [assumption] if assumption else []
-    assert isinstance(task, Pendulum)
     if discount is None and (discount := policy.info.discount) is None:
         discount = Config.discount
         sentences.append(

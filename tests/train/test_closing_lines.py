@@ -117,7 +117,9 @@ def test_regret_is_shown_in_two_parts(tmp_path: Path) -> None:
     score = kp.Score(Pendulum(), optimum - 3, optimum, 0.9, range(100))
     lines = lines_after(kp.preset("reference"), record(499, 100), tmp_path, score=score)
     place = lines.index("Regret: 3.00")
-    assert lines[place + 1].startswith("Exact policy for the discount 0.9: regret 0.24; the other ")
+    assert lines[place + 1].startswith(
+        "Exact policy for the discount 0.9: regret 0.24. Regret from learning: "
+    )
     assert lines[place + 2].startswith("Uniformly random actions")
 
 
