@@ -1,4 +1,4 @@
-"""Where pictures are shown: a display, which is checked before a window opens, or a notebook."""
+"""The place where pictures are shown: a display or a notebook."""
 
 from __future__ import annotations
 

@@ -32,8 +32,6 @@ _ROUNDING = ("TF_NUM_INTRAOP_THREADS", "TF_ENABLE_ONEDNN_OPTS")
 # Whether the user has imported TensorFlow before this package, and without a choice of both.
 _IMPORTED_BEFORE = "tensorflow" in sys.modules
 _MAY_ROUND_OTHERWISE = _IMPORTED_BEFORE and not os.environ.keys() >= set(_ROUNDING)
-
-
 _forked_with_tensorflow = False
 
 

@@ -95,8 +95,9 @@ class Config(Recording, Learning):  # in this order, the fields of Learning come
     def averaged_updates(self) -> int:
         """Number of updates over which the final weights are averaged.
 
-        The moving average begins with the initial weights. It is so short that they have no weight
-        at the end of the run: e^-10.
+        The moving average begins with the initial weights. After all planned updates their share is
+        at most e^-10. A run may make fewer: `Agent.average_weights` takes no average in which the
+        share is above 1e-3.
         """
         return max(1, min(self.average_updates, self.total_updates // 10))
 

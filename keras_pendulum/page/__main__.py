@@ -44,7 +44,10 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         help="file of the page [pendulum.html]",
     )
     parser.add_argument(
-        "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
+        "--gravity",
+        type=float,
+        metavar="G",
+        help="gravity in m/s² [recorded in the file, else the better one of 10 and 1]",
     )
     add_activation_flag(parser)
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
