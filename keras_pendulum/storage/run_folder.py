@@ -178,7 +178,7 @@ class RunFolder:
 
     def _event_files(self) -> list[Path]:
         # By their names: a folder called tensorboard may hold other files.
-        return list(self.events.glob("events.out.tfevents.*"))
+        return [each for each in self.events.glob("events.out.tfevents.*") if each.is_file()]
 
 
 def find_run(path: str | os.PathLike[str]) -> RunFolder:

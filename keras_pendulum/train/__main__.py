@@ -18,14 +18,16 @@ from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
-from keras_pendulum.train.closing_lines import closing_lines
-from keras_pendulum.train.progress import make_progress
+from keras_pendulum.train.closing_lines import next_lines, result_lines
+from keras_pendulum.train.listeners import Listener
+from keras_pendulum.train.progress import Progress, make_progress
 
 if TYPE_CHECKING:
     from keras_pendulum.config.config import Config
     from keras_pendulum.history import EpisodeRecord
     from keras_pendulum.storage.run_folder import RunFolder
     from keras_pendulum.train.live_plot import LivePlot
+    from keras_pendulum.train.train_dqn import TrainingResult
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.train") -> int:
@@ -101,8 +103,7 @@ def _train(arguments: argparse.Namespace) -> int:
     folder = RunFolder(out, config.environment)
     log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
     progress = make_progress(config, arguments.quiet)
-    new_episodes: list[EpisodeRecord] = []
-    started = time.perf_counter()
+    report = _Report(config, folder, progress)
     try:
         with _Interrupt() as interrupt:
             result = train_dqn(
@@ -112,23 +113,12 @@ def _train(arguments: argparse.Namespace) -> int:
                 overwrite=arguments.overwrite,
                 resume=arguments.resume,
                 render=arguments.render,
-                listeners=[each for each in (new_episodes.append, log, progress, live) if each],
+                listeners=[each for each in (log, progress, live, report) if each],
                 should_stop=lambda: interrupt.asked,
             )
-        seconds = time.perf_counter() - started
-        progress.on_phase("finished" if result.finished else "interrupted")
     finally:
         progress.end()
-    print(
-        closing_lines(
-            config,
-            result,
-            folder,
-            seconds,
-            new_episodes=len(new_episodes),
-            score=None if interrupt.asked else result.score,
-        )
-    )
+    print(next_lines(config, result, folder, new_episodes=report.new_episodes))
     return 130 if interrupt.asked else 0
 
 
@@ -151,6 +141,27 @@ def _live_plot(config: Config) -> LivePlot | None:
     except UserError as error:
         print(f"no live plot: {error}; the training continues", file=sys.stderr)
         return None
+
+
+class _Report(Listener):
+    """Prints the result of a run before its picture is drawn."""
+
+    def __init__(self, config: Config, folder: RunFolder, progress: Progress) -> None:
+        self._run = config, folder
+        self._progress = progress
+        self._started = time.perf_counter()
+        self.new_episodes = 0
+
+    def on_episode(self, record: EpisodeRecord) -> None:
+        self.new_episodes += 1
+
+    def on_result(self, result: TrainingResult) -> None:
+        config, folder = self._run
+        seconds = time.perf_counter() - self._started
+        self._progress.on_phase("finished" if result.finished else "interrupted")
+        self._progress.end()
+        lines = result_lines(config, result, folder, seconds, new_episodes=self.new_episodes)
+        print(lines, flush=True)
 
 
 class _Interrupt:

@@ -10,22 +10,15 @@ from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import PRESETS
 
 if TYPE_CHECKING:
-    from keras_pendulum.evaluate.score import Score
     from keras_pendulum.history import EpisodeRecord
     from keras_pendulum.storage.run_folder import RunFolder
     from keras_pendulum.train.train_dqn import TrainingResult
 
 
-def closing_lines(
-    config: Config,
-    result: TrainingResult,
-    folder: RunFolder,
-    seconds: float,
-    *,
-    new_episodes: int,
-    score: Score | None,
+def result_lines(
+    config: Config, result: TrainingResult, folder: RunFolder, seconds: float, *, new_episodes: int
 ) -> str:
-    """Returns the lines.
+    """Returns the lines about the training and the score of its final weights.
 
     Args:
         config: the settings of the run.
@@ -33,7 +26,6 @@ def closing_lines(
         folder: its folder.
         seconds: duration of the training in this process.
         new_episodes: number of episodes in this process; 0 after a resumed run that was finished.
-        score: of the final weights; None for an interrupted run.
     """
     from keras_pendulum.optimum.solutions import solution
 
@@ -45,6 +37,7 @@ def closing_lines(
         state = "Trained" if result.finished else "Interrupted after"
         lines = [f"{state} {total}; this took {seconds:.1f} s."]
     lines += _evaluations(result.history)
+    score = result.score
     if score is not None:
         random = solution(score.task).random_return()
         lines += [score.summary(), f"Uniformly random actions on the same starts: {random:.2f}"]
@@ -54,8 +47,15 @@ def closing_lines(
         elif score.mean_return < random:
             how = _how_to_repair(config, folder, resume)
             lines.append(f"The policy is worse than random actions. {how}")
+    return "\n".join(lines)
+
+
+def next_lines(
+    config: Config, result: TrainingResult, folder: RunFolder, *, new_episodes: int
+) -> str:
+    """Returns the lines about the files of the run and about what can be done with them."""
     saved = ", ".join(file.name for file in folder.files if file.exists())
-    lines.append(f"Saved in {folder.path}: {saved}")
+    lines = [f"Saved in {folder.path}: {saved}"]
     commands = _next_commands(config, result, folder, extend=not new_episodes)
     lines += [f"{what}: python -m keras_pendulum.{words}" for what, words in commands.items()]
     return "\n".join(lines)

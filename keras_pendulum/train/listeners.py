@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.history import EpisodeRecord
+    from keras_pendulum.train.train_dqn import TrainingResult
 
 Phase = Literal["compiling", "evaluating", "drawing"]
 
@@ -29,6 +30,9 @@ class Listener:
 
     def on_end(self) -> None:
         """Called after the last episode, also where `should_stop` ended the run."""
+
+    def on_result(self, result: TrainingResult) -> None:
+        """Called with what `train_dqn` returns, before it draws the picture of the run."""
 
 
 class FunctionListener(Listener):

@@ -48,7 +48,7 @@ class Progress(Listener):
         """Shows what the run does now, such as `compiling`."""
 
     def end(self) -> None:
-        """Ends the line, so that other lines can follow."""
+        """Ends the line, so that other lines can follow. No later phase is shown."""
 
 
 class _Lines(Progress):
@@ -84,6 +84,7 @@ class _Bar(Progress):
         self._greedy_regret = math.nan
         self._seconds: deque[float] = deque(maxlen=MEAN_OVER)  # of episodes with updates
         self._drawn: float | None = None  # time of the last drawing, in s
+        self._ended = False
         self._marks = "━─"  # of the finished and of the remaining episodes
         try:
             self._marks.encode(sys.stdout.encoding)
@@ -104,12 +105,13 @@ class _Bar(Progress):
 
     def on_phase(self, phase: str) -> None:
         self._phase, self._phase_began = phase, time.monotonic()
-        self._draw()
+        if not self._ended:
+            self._draw()
 
     def end(self) -> None:
-        if self._drawn is not None:
+        if self._drawn is not None and not self._ended:
             print(flush=True)
-            self._drawn = None
+        self._ended = True
 
     def _draw(self) -> None:
         self._drawn = time.monotonic()

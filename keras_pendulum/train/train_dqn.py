@@ -122,13 +122,20 @@ def train_dqn(
                 folder.remove_old_run()
         if folder is None:
             finished = _train(run, followers, should_stop)
-            return TrainingResult(run.agent.online, run.history, finished)
+            return _report(TrainingResult(run.agent.online, run.history, finished), followers)
         with CheckpointWriter(folder.weights, folder.require_not_moved) as writer:
             all_listeners = run_listeners(run, folder, writer, followers)
             folder.start_files(config, run.history)
             finished = _train(run, all_listeners, should_stop)
-        score = _draw(run, folder) if finished else None
-    return TrainingResult(run.agent.online, run.history, finished, score)
+        score = None
+        if finished:
+            run.announce("evaluating")
+            score = evaluate_policy(run.agent.online)
+        result = _report(TrainingResult(run.agent.online, run.history, finished, score), followers)
+        if score is not None:
+            run.announce("drawing")
+            _draw(run, folder, score)
+    return result
 
 
 def _train(run: Run, listeners: Sequence[Listener], should_stop: Callable[[], bool]) -> bool:
@@ -151,8 +158,15 @@ def _train(run: Run, listeners: Sequence[Listener], should_stop: Callable[[], bo
     return len(run.history) == run.config.episodes
 
 
-def _draw(run: Run, folder: RunFolder) -> Score:
-    """Evaluates the finished run and writes its picture; returns the score in its title.
+def _report(result: TrainingResult, listeners: Sequence[Listener]) -> TrainingResult:
+    """Calls `on_result` of the listeners; returns the result."""
+    for listener in listeners:
+        listener.on_result(result)
+    return result
+
+
+def _draw(run: Run, folder: RunFolder, score: Score) -> None:
+    """Writes the picture of a finished run, with its score in the title.
 
     A picture that cannot be made is a warning: the run itself is complete.
     """
@@ -161,9 +175,6 @@ def _draw(run: Run, folder: RunFolder) -> Score:
     from keras_pendulum.train.reference_returns import reference_returns, run_title
 
     config = run.config
-    run.announce("evaluating")
-    score = evaluate_policy(run.agent.online)
-    run.announce("drawing")
     try:
         planes = run_phase_planes(run.agent.online, config)
         returns, title = reference_returns(config), run_title(config, score)
@@ -175,4 +186,3 @@ def _draw(run: Run, folder: RunFolder) -> Score:
             "--resume draws it",
             stacklevel=2,
         )
-    return score

@@ -16,7 +16,7 @@ from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.run_folder import RunFolder
 from keras_pendulum.train import evaluations
-from keras_pendulum.train.closing_lines import closing_lines
+from keras_pendulum.train.closing_lines import next_lines, result_lines
 
 
 def record(episode: int, updates: int, **changes: Any) -> EpisodeRecord:
@@ -33,11 +33,16 @@ def lines_after(
     new_episodes: int = 1,
     finished: bool = True,
 ) -> list[str]:
-    result = kp.TrainingResult(kp.DQN((8,)), [last], finished)
-    run_folder = RunFolder(folder, config.environment)
-    return closing_lines(
-        config, result, run_folder, 1.5, new_episodes=new_episodes, score=score
-    ).splitlines()
+    result = kp.TrainingResult(kp.DQN((8,)), [last], finished, score)
+    return all_lines(config, result, RunFolder(folder, config.environment), new_episodes)
+
+
+def all_lines(
+    config: kp.Config, result: kp.TrainingResult, folder: RunFolder, new_episodes: int = 1
+) -> list[str]:
+    first = result_lines(config, result, folder, 1.5, new_episodes=new_episodes)
+    last = next_lines(config, result, folder, new_episodes=new_episodes)
+    return [*first.splitlines(), *last.splitlines()]
 
 
 def warnings(config: kp.Config, last: EpisodeRecord, mean_return: float, folder: Path) -> list[str]:
@@ -137,7 +142,7 @@ def test_evaluations_are_summed_up(tmp_path: Path) -> None:
     result = kp.TrainingResult(kp.DQN((8,)), history, True)
     folder = RunFolder(tmp_path, config.environment)
     folder.best.touch()
-    lines = closing_lines(config, result, folder, 1.5, new_episodes=1, score=None).splitlines()
+    lines = all_lines(config, result, folder)
     assert lines[1] == (
         "Evaluated 4 times on the starts of seeds 900 to 949: best regret 2.35 after episode 149, "
         "last 3.00"

@@ -202,10 +202,11 @@ def test_other_files_in_a_folder_called_tensorboard_are_not_removed(
 ) -> None:
     (tmp_path / "tensorboard").mkdir()
     (tmp_path / "tensorboard" / "my_best.h5").write_bytes(b"a policy")
+    (tmp_path / "tensorboard" / "events.out.tfevents.1.folder").mkdir()
     if overwrite:
         (tmp_path / "tensorboard" / "events.out.tfevents.1.host").touch()
     kp.train_dqn(CONFIG, tmp_path, overwrite=overwrite)
-    assert len(list((tmp_path / "tensorboard").iterdir())) == 1
+    assert len(list((tmp_path / "tensorboard").iterdir())) == 2
     assert (tmp_path / "tensorboard" / "my_best.h5").read_bytes() == b"a policy"
 
 
