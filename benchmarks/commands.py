@@ -73,6 +73,7 @@ COMMANDS = (
         packages=("psutil", "torch"),
     ),
     Command("diagnosis.single_faults", 45, (FOLDER,), ("diagnosis",)),
+    Command("diagnosis.strangers", 90, (FOLDER,), ("diagnosis_strangers",), ("torch",)),
     Command("diagnosis.fault_pairs", 60, (FOLDER,), ("diagnosis_pairs",)),
     Command(
         "diagnosis.healthy_networks",

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from keras_pendulum.storage.find_weights import find_weights
     from keras_pendulum.storage.load_weights import load_weights
     from keras_pendulum.storage.save_weights import save_weights
-    from keras_pendulum.train.train_dqn import TrainingResult, train_dqn
+    from keras_pendulum.train.result import TrainingResult
+    from keras_pendulum.train.train_dqn import train_dqn
 
 __all__ = [
     "DQN",

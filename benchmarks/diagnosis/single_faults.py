@@ -30,10 +30,11 @@ from benchmarks.diagnosis.labelled_networks import (
 )
 from benchmarks.diagnosis.resumable import Result, measure_each
 from benchmarks.result_files import RESULTS, Row, write
+from keras_pendulum.diagnosis.faults import FAULTS as TEXTS
 
 HEALTHY = "healthy"
 ROWS = [*FAULTS, HEALTHY]
-COLUMNS = [*FAULTS, "undetermined", "no finding"]
+COLUMNS = [*FAULTS, *sorted(set(TEXTS) - set(FAULTS)), "no finding"]
 
 
 def diagnose_case(case: Case, folder: Path) -> Result:
@@ -110,7 +111,7 @@ def _row(name: str, results: list[Result]) -> Row:
 
 
 def counts(names: Iterable[str]) -> str:
-    """Returns how often each name is there, the most frequent first: "undetermined 2"."""
+    """Returns how often each name is there, the most frequent first: "not-converged 2"."""
     return ", ".join(f"{name} {count}" for name, count in Counter(names).most_common()) or "–"
 
 

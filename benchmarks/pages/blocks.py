@@ -40,6 +40,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "tests of the files": code_blocks.file_tests,
     "files of the DQN": code_blocks.dqn_files,
     "measured diagnosis": lambda: markdown(rows_of("diagnosis")),
+    "strangers": lambda: markdown(rows_of("diagnosis_strangers")),
     "healthy networks": lambda: markdown(rows_of("diagnosis_healthy")),
     "two faults": lambda: markdown(rows_of("diagnosis_pairs")),
 }

@@ -47,6 +47,12 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "--discount", type=float, metavar="γ", help="discount [recorded in the file, else 0.9]"
     )
     add_torques_flag(parser)
+    parser.add_argument(
+        "--reward-scale",
+        type=float,
+        metavar="FACTOR",
+        help="factor on the rewards in training [recorded in the file, else 1]",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(
         "--report", type=nonempty_path, metavar="FILE.html", help="save a page with a picture"
@@ -74,9 +80,14 @@ def _diagnose(arguments: argparse.Namespace) -> int:
             policy = named_policy(agent, torques)
             policy.name = agent
             agent, torques = policy, None
-        with status("Playing, and comparing with the exact solution"):
+        with status("Playing, and comparing with the exact solution") as report:
             diagnosis = diagnose(
-                agent, gravity=arguments.gravity, discount=arguments.discount, torques=torques
+                agent,
+                gravity=arguments.gravity,
+                discount=arguments.discount,
+                torques=torques,
+                reward_scale=arguments.reward_scale,
+                on_progress=report,
             )
             content, summary = diagnosis.as_json(), diagnosis.summary()
     if arguments.report:

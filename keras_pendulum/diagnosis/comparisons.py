@@ -1,77 +1,17 @@
-"""The learned values compared with the exact ones of other tasks and of other observations."""
+"""An agent compared with the record of its run, and its outputs with those of other torques."""
 
 from __future__ import annotations
 
-from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.measurement import Measurement
-from keras_pendulum.diagnosis.other_tasks import other_value
 from keras_pendulum.diagnosis.run_record import RunRecord
-from keras_pendulum.diagnosis.signals import (
-    Array,
-    advantage_fit,
-    line_fit,
-    output_torques,
-    value_fit,
-)
-from keras_pendulum.diagnosis.states import observe
-from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.optimum.discounted import exact_q
+from keras_pendulum.diagnosis.signals import Array, advantage_fit, line_fit, output_torques
+from keras_pendulum.diagnosis.states import OBSERVATION_CHANGES
 
-
-class Match(NamedTuple):
-    """The match of learned values with those of one hypothesis; 1 is a perfect match."""
-
-    score: float  # product of the values' and the advantages' correlation, 0 where one is negative
-    scaled_score: float  # times the slope of the values, or its inverse: the right task has 1
-
-
-def match(learned: Array, exact: Array) -> Match:
-    """Returns the match of learned and exact Q-values, both [N, A]."""
-    value, advantage = value_fit(learned, exact), advantage_fit(learned, exact)
-    score = max(0.0, value.correlation) * max(0.0, advantage.correlation)
-    size = min(value.slope, 1 / value.slope) if value.slope > 0 else 0.0
-    return Match(score, score * size)
-
-
-def match_task(m: Measurement, gravity: float, discount: float) -> Match:
-    """Returns the match with a task of `other_value`."""
-    table, (theta, speed) = other_value(gravity, discount), m.states.T
-    return match(m.learned_q, exact_q(table, gravity, discount, theta, speed, m.torques))
-
-
-def _observation_changes() -> dict[str, NDArray[np.float32]]:
-    names, identity = Pendulum.observation_names, np.eye(3, dtype=np.float32)
-    changes = {}
-    for order in permutations(range(3)):
-        for signs in product((1, -1), repeat=3):
-            name = ", ".join(
-                ("-" if sign < 0 else "") + names[i] for i, sign in zip(order, signs, strict=True)
-            )
-            changes[name] = identity[:, list(order)] * np.array(signs, np.float32)
-    # Both signs turned is the reversed torque: the pendulum is symmetric.
-    for name in ("cos θ, sin θ, θ̇", "cos θ, -sin θ, -θ̇"):
-        del changes[name]
-    for name, factor in (("θ̇·π/180", np.pi / 180), ("θ̇·180/π", 180 / np.pi), ("θ̇/8", 1 / 8)):
-        changes[f"cos θ, sin θ, {name}"] = np.diag(np.array([1, 1, factor], np.float32))
-    return changes
-
-
-# Matrices [3, 3] that undo a wrong order, sign or unit of the observation, by name.
-OBSERVATION_CHANGES = _observation_changes()
-
-
-def match_observations(m: Measurement) -> dict[str, Match]:
-    """Returns the match with each change of the observation."""
-    observations, exact = observe(m.states[:500]), m.exact_q[:500]
-    return {
-        name: match(m.q_values(observations @ change), exact)
-        for name, change in OBSERVATION_CHANGES.items()
-    }
+SAME_ACTIONS = 0.8  # correlation of an agent's torques with those that its run stored
 
 
 def matched_correlation(m: Measurement) -> float:

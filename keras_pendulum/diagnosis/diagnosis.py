@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from keras_pendulum.config.config import Config
@@ -17,18 +19,24 @@ from keras_pendulum.diagnosis.measurement import STARTS, Measurement
 from keras_pendulum.diagnosis.repairs import find_by_repairs
 from keras_pendulum.diagnosis.run_record import read_record
 from keras_pendulum.diagnosis.states import observe
+from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.pendulum import require_pendulum
-from keras_pendulum.evaluate.evaluation import find_task
+from keras_pendulum.evaluate.evaluation import USUAL_GRAVITIES, find_task
+from keras_pendulum.evaluate.policy import Policy
+from keras_pendulum.evaluate.q_policies import q_function
 from keras_pendulum.evaluate.sources import as_policy
+from keras_pendulum.status import Report
 from keras_pendulum.storage.run_folder import find_run_if_folder
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_STARTS_BY_SECONDS = ((2e-3, STARTS), (1e-2, 12), (math.inf, 4))  # of one call
+_PLAYS = 8 + 5  # of all starts without Q-values: as it is, the repairs, the choice among them
 _BARE_POLICY = "without Q-values, faults of the training cannot be seen"
 _NO_RUN = (
-    "learning rate, exploration and forgetting leave no sure trace in a network: diagnose the run "
-    "folder for them"
+    "number of updates, learning rate, exploration, narrow starts and a small replay buffer leave "
+    "no sure trace in a network. A run folder shows them"
 )
 
 
@@ -45,43 +53,59 @@ class Diagnosis:
     @property
     def verdict(self) -> str:
         """The answer in one line."""
-        measurement = self.measurement
-        regret = f"regret {measurement.regret:.2f}"
-        if not self.findings:
-            little, by_discount = measurement.regret_tolerance, measurement.discount_cost
-            allowed = f"Up to {little:.1f} counts as small: {by_discount:.2f} from the discount, "
-            allowed += f"and {little - by_discount:.1f} of tolerance"
-            if measurement.regret <= little:
-                return f"No finding: {regret}. {allowed}."
-            if not measurement.policy.has_q_values:
-                return (
-                    f"Undetermined: {regret}. {allowed}. The agent gives no Q-values, so only "
-                    "repairs were tried: give them with kp.q_function (docs/agents.md)."
-                )
-            return f"No finding, but {regret}. {allowed}. Train for longer."
-        first = self.findings[0]
-        cost = "" if first.cost is None else f"; without it {first.cost:.1f} more return"
-        return f"{first.name}: {first.evidence} (healthy: {first.healthy}); {regret}{cost}."
+        m = self.measurement
+        regret = f"regret {m.regret:.2f}"
+        if self.findings:
+            first = self.findings[0]
+            cost = "" if first.cost is None else f"; without it {first.cost:.1f} more return"
+            return f"{first.title}: {first.evidence} (healthy: {first.healthy}); {regret}{cost}."
+        allowed = f"Up to {m.regret_tolerance:.1f} counts as small: {m.discount_cost:.2f} from the "
+        allowed += f"discount, and {m.regret_tolerance - m.discount_cost:.1f} of tolerance"
+        if m.regret <= m.regret_tolerance:
+            return f"No finding: {regret}. {allowed}."
+        if not m.policy.has_q_values:
+            same = np.ptp(m.first_torques) == 0
+            reason = "it gives the same torque at all starts" if same else "no repair helps"
+            return (
+                f"Undetermined: {regret}. {allowed}. Nothing more can be said, because the agent "
+                f"gives no Q-values and {reason}: give them with kp.q_function (docs/agents.md)."
+            )
+        right = m.right_agreement
+        return (
+            f"No finding, but {regret}. {allowed}. The values satisfy the right equation to "
+            f"{100 * right.error:.0f} %, and their advantages agree with it by a correlation of "
+            f"{right.correlation:.2f}. Train for longer, with a learning rate that falls."
+        )
+
+    @property
+    def declared(self) -> str:
+        """What the agent is compared with: gravity, discount, torques and size of the reward."""
+        m = self.measurement
+        text = f"g = {m.task.gravity:g}, γ = {m.discount:g}"
+        if m.policy.actions is not None:
+            text += f", {len(m.torques)} torques from {m.torques[0]:g} to {m.torques[-1]:g} N·m"
+        if m.policy.has_q_values:
+            text += f", rewards times {m.reward_scale:g}"
+        return text
 
     def summary(self) -> str:
         """Returns the text that `diagnose` prints; its first line is the answer."""
         measurement = self.measurement
         lines = [
             self.verdict,
-            f"Agent {measurement.policy.name}, g = {measurement.task.gravity:g}, "
-            f"γ = {measurement.discount:g}, {STARTS} starts; "
+            f"Agent {measurement.policy.name}, {self.declared}, {measurement.start_count} starts; "
             f"the discount alone costs {measurement.discount_cost:.2f}.",
             *(f"{sentence}." for sentence in self.assumptions),
         ]
         for number, finding in enumerate(self.findings, 1):
-            lines += ["", f"{number}. {finding.name}", f"   Evidence: {finding.evidence}"]
+            lines += ["", f"{number}. {finding.title}", f"   Evidence: {finding.evidence}"]
             lines.append(f"   Healthy: {finding.healthy}")
             if finding.repair is not None:
                 lines.append(f"   Repair without training: {finding.repair}")
             lines += [f"   {finding.explanation}", f"   Do: {finding.remedy}"]
             lines.append(f"   Read: {finding.page}")
         for note in self.notes:
-            lines += ["", f"Note, costs little: {note.name}: {note.evidence}"]
+            lines += ["", f"Note, costs little: {note.title}: {note.evidence}"]
         if self.limits:
             lines += ["", *(f"Not determined: {limit}." for limit in self.limits)]
         return "\n".join(lines)
@@ -93,7 +117,7 @@ class Diagnosis:
             "agent": measurement.policy.name,
             "gravity": measurement.task.gravity,
             "discount": measurement.discount,
-            "starts": STARTS,
+            "starts": measurement.start_count,
             "regret": measurement.regret,
             "discount_regret": measurement.discount_cost,
             "little": measurement.regret_tolerance,
@@ -127,6 +151,8 @@ def diagnose(
     gravity: float | None = None,
     discount: float | None = None,
     torques: ArrayLike | None = None,
+    reward_scale: float | None = None,
+    on_progress: Report = lambda share: None,
 ) -> Diagnosis:
     """Returns the diagnosis of an agent of Pendulum-v1.
 
@@ -138,16 +164,24 @@ def diagnose(
         discount: declared γ; None takes the recorded one, else 0.9, and the
             summary says so.
         torques: N·m of the outputs, as in `evaluate_policy`.
+        reward_scale: declared factor on the rewards; None takes the recorded one, else 1.
+        on_progress: called with the share of the episodes that are played, 0 to 1, of a policy
+            without Q-values. A slow one plays fewer starts, and the summary says how many.
 
-    Raises ConfigError for a gravity, discount or torques out of range and for CartPole, and as
-    `evaluate_policy` does.
+    Raises ConfigError for a gravity, discount, torques or reward scale out of range and for
+    CartPole, and as `evaluate_policy` does.
 
     >>> [finding.name for finding in kp.diagnose("original").findings]
     ['too-few-updates']
     """
     folder = find_run_if_folder(agent)
     record = None if folder is None else read_record(folder)
+    if isinstance(agent, DQN) and not all(np.isfinite(each).all() for each in agent.get_weights()):
+        agent = q_function(agent, name="DQN")  # no policy, but its values can be diagnosed
     policy = as_policy(agent if folder is None else folder.weights, torques)
+    unknown = gravity is None and policy.info.task is None
+    if unknown and policy.has_q_values and not _are_finite(policy):
+        gravity = USUAL_GRAVITIES[0]  # no task can be found by playing
     found, assumption = find_task(policy, gravity)
     task = require_pendulum(found, policy.name, "diagnose is for Pendulum-v1")
     sentences = [assumption] if assumption else []
@@ -158,9 +192,33 @@ def diagnose(
             "discount= (--discount)"
         )
     discount = Number(0, 1).validate("discount", discount)
-    scale = policy.info.reward_scale
-    diagnosis = diagnose_measurement(Measurement(policy, task, discount, scale, record))
-    return replace(diagnosis, assumptions=sentences)
+    if reward_scale is None:
+        reward_scale = policy.info.reward_scale
+    reward_scale = Number(1e-6, 1e6).validate("reward_scale", reward_scale)
+    starts = STARTS if policy.has_q_values else _start_count(policy)
+    total, played = starts * _PLAYS, 0
+
+    def report(count: int) -> None:
+        nonlocal played
+        played += count
+        on_progress(min(1.0, played / total))
+
+    measurement = Measurement(policy, task, discount, reward_scale, record, starts, report)
+    return replace(diagnose_measurement(measurement), assumptions=sentences)
+
+
+def _are_finite(policy: Policy) -> bool:
+    return bool(np.isfinite(policy.q_values(observe(np.zeros((1, 2))))).all())
+
+
+def _start_count(policy: Policy) -> int:
+    """Returns the number of starts: fewer for a policy that needs long for one observation."""
+    observation = observe(np.zeros((1, 2)))
+    policy.act(observation)  # the first call may compile something
+    began = time.perf_counter()
+    policy.act(observation)
+    seconds = time.perf_counter() - began
+    return next(count for limit, count in _STARTS_BY_SECONDS if seconds < limit)
 
 
 def diagnose_measurement(measurement: Measurement) -> Diagnosis:
@@ -177,7 +235,7 @@ def diagnose_measurement(measurement: Measurement) -> Diagnosis:
     notes = [
         each
         for each in found
-        if each.name != "undetermined" and (each.cost is None or each.cost >= -tolerance)
+        if each.name != "not-converged" and (each.cost is None or each.cost >= -tolerance)
     ]
     return Diagnosis(measurement, [], notes, [])
 
@@ -190,14 +248,11 @@ def _signals(m: Measurement) -> dict[str, float]:
         "value_slope": m.value.slope,
         "value_offset": m.value.offset,
         "value_correlation": m.value.correlation,
-        "plane_value_slope": m.plane_value.slope,
-        "plane_value_correlation": m.plane_value.correlation,
         "advantage_slope": m.advantage.slope,
         "advantage_correlation": m.advantage.correlation,
-        "td_error": m.td_error,
+        "right_equation_error": m.right_agreement.error,
+        "right_equation_correlation": m.right_agreement.correlation,
         "predicted_return": float(m.q_values(observe(m.starts)).max(axis=1).mean()),
         "collected_return": float(m.episodes.returns_to_go(m.discount)[0].mean()),
-        "asymmetry": m.asymmetry,
         "largest_outlier": float(m.outliers.max()),
-        **{f"error_{name.replace(' ', '_')}": error for name, error in m.regions.items()},
     }

@@ -15,7 +15,37 @@ class Fault(NamedTuple):
 
 
 # `findings.find` leaves out what a fault explains in this order.
+_TRACES = (
+    "too-few-updates",
+    "reward-scale",
+    "no-bootstrapping",
+    "narrow-starts",
+    "overestimation",
+    "torque-map",
+    "observation-map",
+    "untrained-outputs",
+    "learning-rate",
+)
 FAULTS: dict[str, Fault] = {
+    "bounded-output": Fault(
+        "The last layer has an activation whose bounds exclude the values. All returns of the "
+        "pendulum are negative, and most are far below -1.",
+        "Remove the activation of the last layer: Q-values need a linear head.",
+        (*_TRACES, "broken-network"),
+    ),
+    "wrong-loss": Fault(
+        "The loss compares other values than Q(s, a) with the target. So the outputs are not the "
+        "values of their actions.",
+        "Compare the output of the stored action, [B], with the target, [B].",
+        (*_TRACES, "broken-network"),
+    ),
+    "wrong-target": Fault(
+        "The values satisfy the equation of another target. So the policy is the best one of "
+        "another task.",
+        "Use r + γ·max Q(s′, ·), with the next state, its maximum over the actions, and a target "
+        "network that is copied.",
+        _TRACES,
+    ),
     "reward-sign": Fault(
         "The learned values are high where the exact values are low. The agent learned to collect "
         "costs.",
@@ -26,7 +56,7 @@ FAULTS: dict[str, Fault] = {
         "The values are the rewards of one step. The agent does not look ahead, so it cannot swing "
         "the pendulum up.",
         "Add γ·max Q(next) to each target. The pendulum never terminates. Truncation is not an "
-        "end.",
+        "end. If all of this is there, copy the online weights into the target network.",
         ("too-few-updates", "reward-scale", "other-discount"),
     ),
     "other-discount": Fault(
@@ -110,11 +140,11 @@ FAULTS: dict[str, Fault] = {
         "still jumps at the end of the run.",
         "Make the learning rate smaller, and let it fall to 0 at the end.",
     ),
-    "undetermined": Fault(
-        "The values or advantages are wrong. No single fault explains them, because several faults "
-        "of the training cause the same network.",
-        "Look at the loss and the return over the run. With a run folder of this package, diagnose "
-        "uses its history and replay buffer, too.",
+    "not-converged": Fault(
+        "The values do not satisfy the right equation yet, and no wrong one clearly better. So the "
+        "training was too short, or something disturbed it that the network alone does not show.",
+        "Train for longer, and look at the loss: it should fall until the end. A record of the run "
+        "shows what else it can be.",
     ),
 }
 
@@ -138,6 +168,13 @@ class Finding:
     evidence: str  #: the figure that shows the fault
     healthy: str  #: the same figure of a healthy network
     repair: Repair | None = None  #: the repair without training, where there is one
+    variant: str = ""  #: which target, loss or head, such as `mean-next`
+    text: Fault | None = None  #: of the variant
+
+    @property
+    def title(self) -> str:
+        """The name, with the variant where there is one."""
+        return f"{self.name} ({self.variant})" if self.variant else self.name
 
     @property
     def cost(self) -> float | None:
@@ -147,22 +184,23 @@ class Finding:
     @property
     def explanation(self) -> str:
         """The explanation of the fault, in two sentences."""
-        return FAULTS[self.name].explanation
+        return (self.text or FAULTS[self.name]).explanation
 
     @property
     def remedy(self) -> str:
         """The remedy of the fault."""
-        return FAULTS[self.name].remedy
+        return (self.text or FAULTS[self.name]).remedy
 
     @property
     def page(self) -> str:
         """The section of the docs."""
-        return f"docs/diagnose.md#{self.name}"
+        return f"docs/my_dqn_does_not_learn.md#{self.name}"
 
     def as_json(self) -> dict[str, Any]:
         """Returns the finding as an object of JSON."""
         return {
             "name": self.name,
+            "variant": self.variant,
             "evidence": self.evidence,
             "healthy": self.healthy,
             "cost": self.cost,

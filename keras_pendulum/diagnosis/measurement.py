@@ -4,33 +4,43 @@ from __future__ import annotations
 
 import copy
 import pickle
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from keras_pendulum.config.config import Config
 from keras_pendulum.diagnosis import signals
+from keras_pendulum.diagnosis.backup import Agreement, Backup, Visited, agreement
+from keras_pendulum.diagnosis.equations import RIGHT, Equation, agreements
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array, Fit
 from keras_pendulum.diagnosis.states import (
+    Act,
     Episodes,
     observe,
-    plane_states,
     simulate,
     training_states,
+    visited_states,
 )
 from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.actions import TorqueActions
 from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
+from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.policy import Observations, Policy
 from keras_pendulum.evaluate.q_policies import DQNPolicy
 from keras_pendulum.optimum.discounted import discounted_value, exact_q
-from keras_pendulum.optimum.dynamics import step_all_torques
 from keras_pendulum.optimum.optimal_return import discounted_return, optimal_return
 from keras_pendulum.optimum.solutions import solution
 
 STARTS = 60  # seeds 0, 1, …
+
+
+def _nothing(count: int) -> None:
+    pass
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,8 @@ class Measurement:
     discount: float  # γ
     reward_scale: float = 1.0  # declared factor on the rewards
     record: RunRecord | None = None  # of the run that trained the policy
+    start_count: int = STARTS
+    on_episodes: Callable[[int], None] = _nothing  # called when so many are played
 
     @property
     def torques(self) -> Array:
@@ -56,6 +68,9 @@ class Measurement:
     def without_code(self) -> Measurement:
         """Returns a copy whose policy has no part that pickle refuses, such as a local function."""
         copied, policy = copy.copy(self), copy.copy(self.policy)
+        vars(copied)["on_episodes"] = _nothing
+        for name in ("visited", "agreements"):  # they hold functions
+            vars(copied).pop(name, None)
         for name, value in vars(policy).items():
             try:
                 pickle.dumps(value)
@@ -66,7 +81,26 @@ class Measurement:
 
     def act(self, observations: Observations) -> Array:
         """Returns the torques [B] in N·m."""
+        if self.policy.has_q_values and not self.finite:
+            return self.torques[self.q_values(observations).argmax(axis=1)]
         return np.asarray(self.policy.act(observations)[:, 0])
+
+    def play(self, act: Act) -> Episodes:
+        """Returns the episodes of a policy from the starts.
+
+        A policy that may have a state plays one after the other, as in `evaluate_policy`.
+        """
+        alone = self.policy.one_by_one and not self.policy.has_q_values
+        parts = np.array_split(self.starts, len(self.starts) if alone else 1)
+        played = []
+        for starts in parts:
+            self.policy.reset()
+            played.append(simulate(act, self.task.gravity, starts))
+            self.on_episodes(len(starts))
+        return Episodes(
+            np.concatenate([each.states for each in played], axis=1),
+            np.concatenate([each.rewards for each in played], axis=1),
+        )
 
     def q_values(self, observations: Observations) -> Array:
         """Returns the learned Q-values [B, A] in units of return."""
@@ -74,31 +108,56 @@ class Measurement:
             q = np.asarray(self.policy.q_values(observations), np.float64)
         return q / self.reward_scale
 
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """The settings of the run, as far as they are known."""
+        return self.policy.info.settings if self.record is None else asdict(self.record.config)
+
+    @property
+    def updates(self) -> int | None:
+        """The number of updates of the run, as its record or its settings have it, else None."""
+        if self.record is not None:
+            return self.record.updates
+        try:
+            return Config(**self.settings).total_updates if self.settings else None
+        except (TypeError, ConfigError):  # settings of another version
+            return None
+
     @cached_property
     def starts(self) -> Array:
         """The starts [B, 2] of the episodes."""
-        return pendulum_starts(range(STARTS))
+        return pendulum_starts(range(self.start_count))
 
     @cached_property
     def episodes(self) -> Episodes:
         """The agent's episodes."""
-        return simulate(self.act, self.task.gravity, self.starts)
+        return self.play(self.act)
+
+    @cached_property
+    def first_torques(self) -> Array:
+        """The torques [B] at the starts, in N·m."""
+        return self.act(observe(self.starts))
 
     @cached_property
     def optimum(self) -> float:
         """The mean optimal return of the starts."""
-        return float(optimal_return(self.task.gravity, range(STARTS)).mean())
+        return float(optimal_return(self.task.gravity, range(self.start_count)).mean())
 
     @cached_property
     def discount_cost(self) -> float:
         """The regret of the exact policy for the declared discount."""
-        returns = discounted_return(self.task.gravity, self.discount, range(STARTS))
+        returns = discounted_return(self.task.gravity, self.discount, range(self.start_count))
         return max(0.0, self.optimum - float(returns.mean()))
 
     @cached_property
     def regret(self) -> float:
         """The mean optimal return minus the agent's."""
         return self.optimum - float(self.episodes.returns.mean())
+
+    @property
+    def avoidable_regret(self) -> float:
+        """The regret that is not the discount's."""
+        return self.regret - self.discount_cost
 
     @cached_property
     def regret_tolerance(self) -> float:
@@ -118,6 +177,41 @@ class Measurement:
     def states(self) -> Array:
         """States [N, 2] that a run of this task meets."""
         return training_states(self.table, self.task.gravity, self.discount, self.starts)
+
+    @cached_property
+    def visited(self) -> Visited:
+        """The network at the states that it visits itself, with random torques."""
+        gravity, torques = self.task.gravity, self.torques
+        states = visited_states(self.q_values, torques, gravity, self.starts)
+        return Visited(self.q_values, states, torques, gravity, self.discount)
+
+    @cached_property
+    def backup(self) -> Backup:
+        """The values at `visited`, and at all states that can follow, of the declared task."""
+        return self.visited.backup()
+
+    @cached_property
+    def right_agreement(self) -> Agreement:
+        """How well the values obey the right equation of the declared task."""
+        return agreement(self.backup, self.backup.right)
+
+    @cached_property
+    def agreements(self) -> list[tuple[Agreement, Equation]]:
+        """The wrong equations, that with the smallest error first."""
+        return sorted(agreements(self.visited, self.backup), key=lambda item: item[0].error)
+
+    @cached_property
+    def equation_errors(self) -> dict[str, float]:
+        """The errors by the formula, that of the right equation first."""
+        errors = {RIGHT: self.right_agreement.error}
+        for own, equation in self.agreements:
+            errors.setdefault(equation.formula, own.error)
+        return errors
+
+    @property
+    def obeys_right_equation(self) -> bool:
+        """Whether the values are near the fixed point of the right equation."""
+        return self.right_agreement.error < 0.1 and self.right_agreement.correlation > 0.5
 
     @cached_property
     def learned_q(self) -> Array:
@@ -149,12 +243,6 @@ class Measurement:
         return signals.advantage_fit(self.learned_q, self.exact_q)
 
     @cached_property
-    def plane_value(self) -> Fit:
-        """The fit of the values on the whole plane."""
-        states = plane_states()
-        return signals.value_fit(self.q_values(observe(states)), self._exact_q(states))
-
-    @cached_property
     def advantage_size(self) -> float:
         """The spread of the learned advantages as a multiple of that of the exact ones."""
         exact = signals.advantages(self.exact_q).std()
@@ -170,25 +258,6 @@ class Measurement:
     def outliers(self) -> Array:
         """The robust z-score [A] of each output's mean error."""
         return signals.output_outliers(self.learned_q, self.exact_q)
-
-    @cached_property
-    def asymmetry(self) -> float:
-        """The root mean square of Q(s, u) - Q(-s, -u), as a share of the spread of Q."""
-        q, mirrored_q = self.learned_q, self.q_values(observe(-self.states))[:, ::-1]
-        spread = q.std()
-        return float(np.sqrt(np.mean((q - mirrored_q) ** 2)) / spread) if spread > 0 else 0.0
-
-    @cached_property
-    def td_error(self) -> float:
-        """The root mean square of the exact TD error, as a share of the spread of exact values."""
-        states = self.states[:400]
-        reward, theta, speed = step_all_torques(
-            self.task.gravity, states[:, 0], states[:, 1], self.torques
-        )
-        following = np.stack([theta.ravel(), speed.ravel()], axis=1)
-        best = self.q_values(observe(following)).max(axis=1).reshape(reward.shape)
-        error = reward + self.discount * best - self.q_values(observe(states))
-        return float(np.sqrt(np.mean(error**2)) / self.value_spread)
 
     @cached_property
     def excess(self) -> float:
@@ -211,23 +280,6 @@ class Measurement:
     def value_spread(self) -> float:
         """The standard deviation of the exact values at `states`."""
         return float(self.exact_q.mean(axis=1).std())
-
-    @cached_property
-    def regions(self) -> dict[str, float]:
-        """The median error of the values by region, as a share of their spread."""
-        error = signals.relative_error(self.learned_q, self.exact_q)
-        theta, speed = self.states.T
-        angle = np.abs((theta + np.pi) % (2 * np.pi) - np.pi)
-        upright = (angle < 0.5) & (np.abs(speed) < 1.5)
-        parts = {
-            "near upright": upright,
-            "upper half": (angle < np.pi / 2) & ~upright,
-            "lower half": angle >= np.pi / 2,
-        }
-        return {
-            name: float(np.median(error[where])) if where.any() else 0.0
-            for name, where in parts.items()
-        }
 
     @cached_property
     def units(self) -> tuple[float, float]:

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from keras_pendulum.diagnosis.comparisons import OBSERVATION_CHANGES
 from keras_pendulum.diagnosis.faults import Finding, Repair
-from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.measurement import STARTS, Measurement
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.diagnosis.states import Act, simulate
-from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.diagnosis.states import OBSERVATION_CHANGES, Act
 
-_LIKELY_CHANGES = (
+LIKELY_CHANGES = (
     "cos θ, sin θ, -θ̇",
     "sin θ, cos θ, θ̇",
     "-cos θ, sin θ, θ̇",
     "cos θ, sin θ, θ̇·π/180",
 )
+
+
+_FACTORS = {"torque reversed": -1.0, "half the torque": 0.5, "double the torque": 2.0}
+_FEW_STARTS = 6  # to choose the change of the observation that is played on all
 
 
 def change_torques(m: Measurement, torques: Array, name: str) -> Repair:
@@ -44,24 +47,29 @@ def change_observations(m: Measurement, name: str) -> Repair:
     return _play(m, f"observation [{name}]", lambda observations: m.act(observations @ change))
 
 
-def change_gravity(m: Measurement, gravity: float) -> Repair:
-    """Plays the agent at another gravity; the regret is that of the other task."""
-    regret = replace(m, task=Pendulum(gravity)).regret
-    return Repair(f"g = {gravity:g}", regret, m.regret - regret)
+def _scale_torques(m: Measurement, name: str) -> Repair:
+    return _play(m, name, lambda observations: _FACTORS[name] * m.act(observations))
 
 
 def find_by_repairs(m: Measurement) -> list[Finding]:
-    """Returns the finding on a policy without Q-values: the simple change that helps most."""
-    reverse = _play(m, "torque reversed", lambda observations: -m.act(observations))
-    repairs = [("torque-map", reverse)]
-    repairs += [("observation-map", change_observations(m, name)) for name in _LIKELY_CHANGES]
+    """Returns the finding on a policy without Q-values: the simple change that helps most.
+
+    Where the policy is fast, each order and sign of the observation is tried on a few starts.
+    """
+    repairs = [("torque-map", _scale_torques(m, name)) for name in _FACTORS]
+    names: Sequence[str] = LIKELY_CHANGES
+    if m.start_count == STARTS:
+        few = replace(m, start_count=_FEW_STARTS)
+        tried = {name: change_observations(few, name).regret for name in OBSERVATION_CHANGES}
+        names = sorted(tried, key=lambda name: tried[name])[:1]
+    repairs += [("observation-map", change_observations(m, name)) for name in names]
     name, best = min(repairs, key=lambda item: item[1].regret)
-    if best.won <= 0.5 * m.regret:
+    if best.won <= 0.5 * m.avoidable_regret:
         return []
     evidence = f"with {best.name} the regret is {best.regret:.1f}"
     return [Finding(name, evidence, "no change helps", best)]
 
 
 def _play(m: Measurement, name: str, act: Act) -> Repair:
-    regret = m.optimum - float(simulate(act, m.task.gravity, m.starts).returns.mean())
+    regret = m.optimum - float(m.play(act).returns.mean())
     return Repair(name, regret, m.regret - regret)

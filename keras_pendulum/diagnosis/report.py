@@ -19,6 +19,8 @@ body { font: 16px/1.5 system-ui, sans-serif; margin: 0 auto; max-width: 46rem; p
   overflow-wrap: break-word; color: #1a1a1a; background: #ffffff; }
 h1 { font-size: 1.4rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
 img { max-width: 100%; height: auto; }
+@media (prefers-color-scheme: dark) {
+  body { color: #e6e6e6; background: #16181c; } img { border-radius: 6px; } }
 dt { font-weight: 600; } dd { margin: 0 0 0.5rem 0; }
 """
 
@@ -34,14 +36,15 @@ def as_html(diagnosis: Diagnosis) -> str:
         f"<title>Diagnosis of {name}</title><style>{_STYLE}</style></head><body>",
         f"<h1>Diagnosis of {name}</h1>",
         f"<p><strong>{_text(diagnosis.verdict)}</strong></p>",
-        f"<p>{measurement.task.name}, γ = {measurement.discount:g}. The best possible "
-        f"mean return is {measurement.optimum:.2f}.</p>",
+        f"<p>{_text(diagnosis.declared)}. The best possible mean return is "
+        f"{measurement.optimum:.2f}.</p>",
         f'<img alt="Learned and exact values, repairs" src="{_image(diagnosis)}">',
     ]
     for number, finding in enumerate(diagnosis.findings, 1):
-        parts += [f"<h2>{number}. {_text(finding.name)}</h2>", _section(finding)]
+        parts += [f"<h2>{number}. {_text(finding.title)}</h2>", _section(finding)]
     for note in diagnosis.notes:
-        parts += [f"<h2>Note, costs little: {_text(note.name)}</h2>", _section(note)]
+        parts += [f"<h2>Note, costs little: {_text(note.title)}</h2>", _section(note)]
+    parts += [f"<p>{_text(sentence)}.</p>" for sentence in diagnosis.assumptions]
     parts += [f"<p>Not determined: {_text(limit)}.</p>" for limit in diagnosis.limits]
     return "\n".join([*parts, "</body></html>", ""])
 

@@ -73,12 +73,3 @@ def output_outliers(learned: Array, exact: Array) -> Array:
     distance = np.abs(error - np.median(error))
     spread = 1.48 * np.median(distance)
     return distance / max(spread, 1e-9 * (1 + np.abs(learned).max()))
-
-
-def relative_error(learned: Array, exact: Array) -> Array:
-    """Returns each state's error after the best straight line, as a share of the exact spread."""
-    values, truth = learned.mean(axis=1), exact.mean(axis=1)
-    fit = line_fit(values, truth)
-    slope = fit.slope if abs(fit.slope) > 1e-9 else 1.0
-    spread = max(truth.std(), 1e-9)
-    return np.asarray(np.abs((values - fit.offset) / slope - truth) / spread)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
 from keras_pendulum.optimum.value_iteration import value_at
@@ -17,7 +18,8 @@ from keras_pendulum.optimum.value_iteration import value_at
 # From observations [B, 3] to torques [B] in N·m.
 Act = Callable[[NDArray[np.float32]], Array]
 
-_STATES = 1500  # of each kind
+_STATES = 1500  # of each other kind
+_VISITED = 300
 
 
 def observe(states: Array) -> NDArray[np.float32]:
@@ -66,10 +68,25 @@ def simulate(act: Act, gravity: float, starts: Array) -> Episodes:
     return Episodes(states, rewards)
 
 
-def plane_states() -> Array:
-    """Returns states [N, 2] from the whole plane."""
-    random = np.random.RandomState(0)
-    return np.asarray(random.uniform((-np.pi, -MAX_SPEED), (np.pi, MAX_SPEED), (_STATES, 2)))
+def visited_states(q_values: Act, torques: Array, gravity: float, starts: Array) -> Array:
+    """Returns 300 states [N, 2] that a network visits, with 10 to 100 % of random torques.
+
+    Args:
+        q_values: from observations [B, 3] to Q-values [B, A].
+        torques: N·m of the outputs, [A].
+        gravity: m/s².
+        starts: [B, 2].
+    """
+    random = np.random.RandomState(2)
+
+    def act(observations: NDArray[np.float32]) -> Array:
+        greedy = q_values(observations).argmax(axis=1)
+        explore = random.random_sample(len(greedy)) < epsilon
+        return torques[np.where(explore, random.randint(len(torques), size=len(greedy)), greedy)]
+
+    epsilon = np.linspace(0.1, 1, len(starts))[random.permutation(len(starts))]
+    states = simulate(act, gravity, starts).states.reshape(-1, 2)
+    return states[random.permutation(len(states))[:_VISITED]]
 
 
 def training_states(
@@ -97,3 +114,24 @@ def training_states(
     epsilon = np.linspace(0.1, 1, len(starts))[random.permutation(len(starts))]
     states = simulate(act, gravity, starts).states.reshape(-1, 2)
     return states[random.permutation(len(states))[:_STATES]]
+
+
+def _observation_changes() -> dict[str, NDArray[np.float32]]:
+    names, identity = Pendulum.observation_names, np.eye(3, dtype=np.float32)
+    changes = {}
+    for order in permutations(range(3)):
+        for signs in product((1, -1), repeat=3):
+            name = ", ".join(
+                ("-" if sign < 0 else "") + names[i] for i, sign in zip(order, signs, strict=True)
+            )
+            changes[name] = identity[:, list(order)] * np.array(signs, np.float32)
+    # Both signs turned is the reversed torque: the pendulum is symmetric.
+    for name in ("cos θ, sin θ, θ̇", "cos θ, -sin θ, -θ̇"):
+        del changes[name]
+    for name, factor in (("θ̇·π/180", np.pi / 180), ("θ̇·180/π", 180 / np.pi), ("θ̇/8", 1 / 8)):
+        changes[f"cos θ, sin θ, {name}"] = np.diag(np.array([1, 1, factor], np.float32))
+    return changes
+
+
+# Matrices [3, 3] that undo a wrong order, sign or unit of the observation, by name.
+OBSERVATION_CHANGES = _observation_changes()

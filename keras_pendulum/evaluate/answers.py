@@ -92,16 +92,24 @@ def q_values_of(answer: Any, batch: int, count: int | None = None) -> NDArray[An
     values = _array(answer, expected)
     if values.shape != (batch, count or values.size // batch) or values.shape[1] < 2:
         raise _wrong(f"an array of the shape {list(values.shape)}", expected)
-    finite = np.isfinite(values).all(axis=1)
+    return values
+
+
+def best_of(q_values: NDArray[Any]) -> NDArray[np.intp]:
+    """Returns the index [B] of the highest Q-value of each row [B, A].
+
+    Raises ActionError for a value that is not finite.
+    """
+    finite = np.isfinite(q_values).all(axis=1)
     if not finite.all():
         raise ActionError("the agent returned a Q-value that is not finite", int(finite.argmin()))
-    return values
+    return q_values.argmax(axis=1)
 
 
 def _numbers(answer: Any, batch: Batch, expected: str) -> NDArray[Any]:
     """Returns one number for each observation."""
     numbers = _array(answer, expected)
-    if numbers.shape not in (batch, (*batch, 1)):
+    if numbers.shape not in (batch, (*batch, 1)) and (batch or numbers.size != 1):
         raise _wrong(f"an array of the shape {list(numbers.shape)}", expected)
     return numbers.reshape(batch)
 

@@ -13,7 +13,7 @@ from keras_pendulum.dqn.network import DQN
 from keras_pendulum.dqn.policy import GreedyPolicy
 from keras_pendulum.environments.actions import Actions, TorqueActions, torque_actions
 from keras_pendulum.errors import ConfigError, require_finite
-from keras_pendulum.evaluate.answers import call_agent, is_instance, name_of, q_values_of
+from keras_pendulum.evaluate.answers import best_of, call_agent, is_instance, name_of, q_values_of
 from keras_pendulum.evaluate.policy import Observations, Policy
 from keras_pendulum.storage.run_info import RunInfo
 
@@ -103,7 +103,7 @@ class QPolicy(Policy):
 
     def act(self, observations: Observations) -> NDArray[Any]:
         """Returns the actions with the highest Q-values."""
-        return self.actions.values.take(self.q_values(observations).argmax(axis=1), axis=0)
+        return self.actions.values.take(best_of(self.q_values(observations)), axis=0)
 
 
 def q_function(

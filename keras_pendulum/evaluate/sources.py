@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import keras
+import numpy as np
 from numpy.typing import ArrayLike
 
 from keras_pendulum.dqn.network import DQN
@@ -22,8 +23,10 @@ from keras_pendulum.storage.load_weights import load_weights
 
 _EXPECTED = (
     "expected a DQN, a Policy, a path, a Keras model, kp.q_function(...), a function from an "
-    "observation to a torque, or an object with predict(observation, deterministic=True)"
+    "observation to a torque, or an object with predict(observation, deterministic=True), act, "
+    "choose_action, select_action or get_action"
 )
+_METHODS = ("act", "choose_action", "select_action", "get_action", "predict")
 
 
 def load_policy(source: DQN | str | os.PathLike[str], activation: str | None = None) -> Policy:
@@ -48,7 +51,8 @@ def as_policy(source: Any, torques: ArrayLike | None = None, name: str | None = 
     Args:
         source: a `DQN`, or the path or shipped name of its file; a Keras model from observations
             [B, 3] to Q-values [B, A], or its `.keras` file; a `q_function`; a function from an
-            observation [3] to a torque in N·m; an object with Stable-Baselines3's `predict`; a
+            observation [3] to a torque in N·m; an object with Stable-Baselines3's `predict`, or
+            with such a function as its `act`, `choose_action`, `select_action` or `get_action`; a
             Policy.
         torques: N·m, what the outputs or indices stand for, -2 to 2; None takes
             `linspace(-2, 2, A)`.
@@ -73,13 +77,19 @@ def as_policy(source: Any, torques: ArrayLike | None = None, name: str | None = 
                 f"the Keras model takes inputs of the shape {shape}; an observation of "
                 f"{Pendulum.environment} has {size} numbers"
             )
-        return QPolicy(partial(source, training=False), torques, name or source.name)
+        call = partial(source, training=False)
+        if isinstance(shape, tuple) and len(shape) == 3 and shape[1] == 1:  # such as keras-rl's
+            return QPolicy(lambda x: call(x[:, np.newaxis]), torques, name or source.name)
+        return QPolicy(call, torques, name or source.name)
     if isinstance(source, type):
         raise TypeError(one_line(f"agent is the class {source.__name__}; {_EXPECTED}"))
     if has_predict(source):
         return PredictPolicy(source, torques)
     if is_instance(source, "torch.nn", "Module"):
         raise TypeError("agent is a PyTorch module; give kp.q_function(module, torques=...)")
+    for method in _METHODS:
+        if callable(getattr(source, method, None)):
+            return FunctionPolicy(getattr(source, method), torques)
     if not callable(source):
         raise TypeError(one_line(f"agent is {source!r}; {_EXPECTED}"))
     return FunctionPolicy(source, torques)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from keras_pendulum.history import EpisodeRecord
     from keras_pendulum.storage.run_folder import RunFolder
     from keras_pendulum.train.live_plot import LivePlot
-    from keras_pendulum.train.train_dqn import TrainingResult
+    from keras_pendulum.train.result import TrainingResult
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.train") -> int:

@@ -12,7 +12,7 @@ from keras_pendulum.config.presets import PRESETS
 if TYPE_CHECKING:
     from keras_pendulum.history import EpisodeRecord
     from keras_pendulum.storage.run_folder import RunFolder
-    from keras_pendulum.train.train_dqn import TrainingResult
+    from keras_pendulum.train.result import TrainingResult
 
 
 def result_lines(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.history import EpisodeRecord
-    from keras_pendulum.train.train_dqn import TrainingResult
+    from keras_pendulum.train.result import TrainingResult
 
 Phase = Literal["compiling", "evaluating", "drawing"]
 

@@ -6,7 +6,6 @@ import contextlib
 import os
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.dqn.network import DQN
@@ -23,17 +22,8 @@ from keras_pendulum.train.folder_files import run_listeners
 from keras_pendulum.train.listeners import FunctionListener, Listener, Phase
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.progress import make_progress
+from keras_pendulum.train.result import TrainingResult
 from keras_pendulum.train.run import Run, make_run
-
-
-@dataclass(frozen=True, eq=False)
-class TrainingResult:
-    """The trained network, and the record of each episode."""
-
-    network: DQN  #: the network after the last update
-    history: list[EpisodeRecord]  #: one record per episode, with the names of history.csv's columns
-    finished: bool  #: false where `should_stop` ended the run before its last episode
-    score: Score | None = None  #: of the greedy policy; None without a folder or unfinished
 
 
 def train_dqn(

@@ -24,12 +24,13 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_first_line_is_the_answer(weights: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert command.main([str(weights)]) == 0
+def test_first_line_is_the_answer(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command.main(["original"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("too-few-updates: slope of learned on exact values ")
-    assert "g = 1, γ = 0.9, 60 starts" in lines[1]
-    assert "   Read: docs/diagnose.md#too-few-updates" in lines
+    assumed = "g = 1, γ = 0.9, 41 torques from -2 to 2 N·m, rewards times 1, 60 starts; "
+    assert lines[1].startswith(f"Agent original, {assumed}")
+    assert "   Read: docs/my_dqn_does_not_learn.md#too-few-updates" in lines
 
 
 def test_agent_has_the_name_that_was_typed(
@@ -46,7 +47,7 @@ def test_json_has_findings_and_signals(weights: Path, capsys: pytest.CaptureFixt
     assert command.main([str(weights), "--json", "--gravity", "10", "--discount", "0.98"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["gravity"], found["discount"]) == (10, 0.98)
-    assert found["findings"][0]["page"].startswith("docs/diagnose.md#")
+    assert found["findings"][0]["page"].startswith("docs/my_dqn_does_not_learn.md#")
     assert found["signals"]["value_slope"] < 0.3
 
 

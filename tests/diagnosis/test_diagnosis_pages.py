@@ -6,11 +6,11 @@ import re
 from functools import partial
 from pathlib import Path
 
-import pytest
 from conftest import ROOT
 
 import keras_pendulum as kp
 from benchmarks.diagnosis.labelled_networks import FAULTS
+from benchmarks.diagnosis.stranger_programs import MISTAKES
 from benchmarks.pages.fault_pictures import PICTURES, picture_cases
 from keras_pendulum.diagnosis.faults import FAULTS as TEXTS
 from keras_pendulum.dqn.exploration import epsilon_by_episodes
@@ -23,21 +23,18 @@ def sections(page: str) -> set[str]:
     return set(re.findall(r"^### ([a-z-]+)$", page, re.MULTILINE))
 
 
-def test_every_finding_has_a_section() -> None:
-    assert sections(DIAGNOSE) == set(TEXTS)
-    assert sections(LEARN) == set(FAULTS) == set(TEXTS) - {"undetermined"}
+def test_every_finding_has_a_section_and_a_row() -> None:
+    assert sections(LEARN) == set(TEXTS) > set(FAULTS)
+    table = DIAGNOSE.split("## The findings")[1].split("##")[0]
+    assert set(re.findall(r"my_dqn_does_not_learn\.md#([a-z-]+)", table)) == set(TEXTS)
 
 
-@pytest.mark.parametrize("name", TEXTS)
-def test_section_has_the_sentences_of_the_finding(name: str) -> None:
-    found = re.search(
-        rf"^### {name}\n\n(.*?)\n\nWhat to do: (.*?)\n(?:\n|\Z)", DIAGNOSE, re.M | re.S
-    )
-    assert found is not None
-    explanation, remedy = (" ".join(text.split()) for text in found.groups())
-    fault = TEXTS[name]
-    assert explanation == fault.explanation
-    assert remedy == fault.remedy[0].lower() + fault.remedy[1:]
+def test_every_variant_has_a_row() -> None:
+    rows = set(re.findall(r"^\| `([a-z-]+)` \|", LEARN, re.MULTILINE))
+    named = {mistake.variant for mistake in MISTAKES.values()} - {""}
+    heads = {"softmax", "tanh", "sigmoid", "relu"}
+    assert rows == named - heads
+    assert all(head in LEARN.lower() for head in heads)
 
 
 def test_page_says_when_epsilon_of_the_reference_falls() -> None:

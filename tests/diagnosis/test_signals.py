@@ -42,17 +42,6 @@ def test_output_outliers_mark_the_outputs_that_were_never_learned() -> None:
     assert signals.output_outliers(EXACT + noise, EXACT).max() < 7
 
 
-def test_relative_error_ignores_scale_and_offset() -> None:
-    states = np.linspace(-9, 0, 50)[:, None] + np.zeros((50, 3))
-    assert signals.relative_error(2 * states - 4, states) == pytest.approx(0, abs=1e-9)
-
-
-def test_asymmetry_compares_the_mirrored_state_and_torque() -> None:
-    assert measure(exact_values).asymmetry == pytest.approx(0, abs=1e-6)
-    assert measure(lambda o: exact_values(o) + 20 * o[:, 1:2]).asymmetry > 0.5
-    assert measure(lambda o: np.ones((len(o), 41))).asymmetry == 0
-
-
 def test_units_counts_saturated_and_dead_units() -> None:
     network = kp.DQN((4, 2), activation="tanh,relu")
     kernel, bias, *rest = network.get_weights()

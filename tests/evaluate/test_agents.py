@@ -291,7 +291,7 @@ def answering(answer: Any) -> Policy:
         (float("nan"), "the torque nan N·m; expected a number from -2 to 2"),
         (-2.001, "the torque -2.001 N·m"),
         (np.zeros(2), r"an array of the shape \[2\]; expected a torque in N·m"),
-        (np.zeros((1, 1)), r"an array of the shape \[1, 1\]"),
+        (np.zeros((1, 2)), r"an array of the shape \[1, 2\]"),
         ("left", "a str of the type <U4"),
         (1, r"the integer 1; expected a torque as a floating-point number; for an index, give"),
         (np.int8(1), "the integer 1"),
@@ -342,7 +342,6 @@ def test_answer_that_is_no_index_is_refused(answer: Any, problem: str) -> None:
         (lambda x: x[:, 0], r"an array of the shape \[2\]; expected Q-values of the shape \[2, "),
         (lambda x: x[:1], r"an array of the shape \[1, 3\]"),
         (lambda x: x[:, :1], r"an array of the shape \[2, 1\]"),
-        (lambda x: x * np.nan, "a Q-value that is not finite"),
         (lambda x: {"q": x}, "a dict of the type object"),
         (lambda x: x.missing, r"raised AttributeError: .*missing.* \(test_agents.py, line \d+\)$"),
     ],
@@ -350,6 +349,12 @@ def test_answer_that_is_no_index_is_refused(answer: Any, problem: str) -> None:
 def test_function_that_gives_no_q_values_is_refused_at_once(function: Any, problem: str) -> None:
     with pytest.raises(kp.UserError, match=f"^the agent (returned )?{problem}"):
         kp.q_function(function)
+
+
+def test_q_values_that_are_not_finite_choose_no_action() -> None:
+    policy = kp.q_function(lambda observations: observations * np.nan)
+    with pytest.raises(kp.UserError, match=r"episode 0, step 0: .* Q-value that is not finite"):
+        kp.evaluate_policy(policy, 1, gravity=1.0)
 
 
 def test_q_function_needs_a_function() -> None:
@@ -364,3 +369,30 @@ def test_row_of_a_wrong_answer_is_known() -> None:
     with pytest.raises(ActionError) as caught:
         as_policy(act).act(OBSERVATIONS)
     assert caught.value.row == 6
+
+
+@pytest.mark.parametrize("method", ["act", "choose_action", "select_action", "get_action"])
+@pytest.mark.parametrize("answer", [1.5, [1.5], [[1.5]], np.array([[1.5]], np.float32)])
+def test_object_that_chooses_an_action_is_an_agent(method: str, answer: Any) -> None:
+    agent = type("Agent", (), {method: lambda self, observation: answer})()
+    score = kp.evaluate_policy(agent, 2, gravity=1.0)
+    assert score.returns == pytest.approx(kp.evaluate_policy(lambda o: 1.5, 2, gravity=1.0).returns)
+
+
+def test_object_that_chooses_an_index_needs_its_torques() -> None:
+    class Agent:
+        def choose_action(self, observation: Any) -> int:
+            return 2
+
+    returns = kp.evaluate_policy(Agent(), 2, gravity=1.0, torques=[-2, 0, 1.5]).returns
+    assert returns == pytest.approx(kp.evaluate_policy(lambda o: 1.5, 2, gravity=1.0).returns)
+    with pytest.raises(kp.UserError, match="for an index, give the torques"):
+        kp.evaluate_policy(Agent(), 2, gravity=1.0)
+
+
+def test_keras_model_of_one_row_gets_one_row(network: kp.DQN) -> None:
+    model = keras.Sequential([keras.Input((1, 3)), keras.layers.Flatten(), keras.layers.Dense(5)])
+    rows = np.eye(3, dtype=np.float32)
+    policy = as_policy(model)
+    assert policy.q_values(rows) == pytest.approx(model(rows[:, None]).numpy())
+    assert kp.evaluate_policy(model, 1, gravity=1.0).regret > 0

@@ -1,0 +1,249 @@
+"""Small DQN programs as beginners write them, with one mistake each.
+
+`train` is a complete program: Gymnasium's pendulum, a NumPy replay buffer and a network of PyTorch
+or Keras. It shares no code with this package, so `benchmarks.diagnosis.strangers` can measure how
+`diagnose` judges networks of other people. `MISTAKES` lists what can be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Program:
+    """The settings of a program, and its mistakes; the defaults are right."""
+
+    library: str = "torch"  # or "keras"
+    gravity: float = 10.0
+    torque_count: int = 9
+    discount: float = 0.95
+    activation: str = "relu"
+    hidden: tuple[int, ...] = (64, 64)
+    steps: int = 12_000
+    learning_rate: float = 1e-3
+    seed: int = 0
+
+    target: str = "max"  # r + γ·this over the next values
+    loss: str = "chosen"  # which outputs are compared with which targets
+    head: str = "linear"  # activation of the last layer
+    copy_every: int = 50  # updates between two copies to the target network; 0 is never
+    through_target: bool = False  # whether the gradient passes the target
+    done: str = "never"  # which transitions end: never, truncated or always
+    observation: Callable[[Array], Array] = lambda observation: observation  # in learning
+    reward: Callable[[float], float] = lambda reward: reward
+    torque: Callable[[Array], Array] = lambda torque: torque  # in learning
+    stored_action: str = "acted"
+    stored_reward: str = "now"
+    capacity: int = 50_000  # of the replay buffer
+    consecutive: bool = False  # whether a batch is the last rows
+    epsilon: str = "falls"
+    narrow_starts: bool = False
+    # The program in use, after learning:
+    acting_observation: Callable[[Array], Array] = lambda observation: observation
+    acting_torque: Callable[[Array], Array] = lambda torque: torque
+    # What its author believes:
+    declared_gravity: float | None = None
+    declared_discount: float | None = None
+
+    @property
+    def torques(self) -> Array:
+        """The torques [A] that the author believes in, in N·m."""
+        return np.linspace(-2, 2, self.torque_count)
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A mistake: what it changes, and which finding and variant are right."""
+
+    changes: dict[str, Any]
+    finding: str
+    variant: str = ""
+    also: tuple[str, ...] = ()  # other findings that are right
+
+
+def _turn(order: list[int], signs: list[int]) -> Callable[[Array], Array]:
+    return lambda observation: observation[..., order] * np.array(signs, np.float32)
+
+
+def _wrong_target(variant: str, **changes: Any) -> Mistake:
+    return Mistake(changes, "wrong-target", variant)
+
+
+MISTAKES: dict[str, Mistake] = {
+    "mean of the next values": _wrong_target("mean-next", target="mean"),
+    "minimum of the next values": _wrong_target("min-next", target="min"),
+    "first of the next values": _wrong_target("fixed-action-next", target="first"),
+    "last of the next values": _wrong_target("fixed-action-next", target="last"),
+    "maximum over the batch": _wrong_target("batch-max", target="batch-max"),
+    "index for value": _wrong_target("index-for-value", target="index"),
+    "next state is the state": _wrong_target("same-state", target="same-state"),
+    "target network never copied": _wrong_target("frozen-target", copy_every=0),
+    "one target for all outputs": Mistake({"loss": "same-target"}, "wrong-loss", "same-target"),
+    "zeros for the others": Mistake({"loss": "zero-others"}, "wrong-loss", "zero-others"),
+    "(B, 1) minus (B,)": Mistake({"loss": "broadcast"}, "wrong-loss", "batch-broadcast"),
+    "softmax head": Mistake({"head": "softmax"}, "bounded-output", "softmax"),
+    "tanh head": Mistake({"head": "tanh"}, "bounded-output", "tanh"),
+    "sigmoid head": Mistake({"head": "sigmoid"}, "bounded-output", "sigmoid"),
+    "ReLU head": Mistake({"head": "relu"}, "bounded-output", "relu"),
+    "no lookahead": Mistake({"target": "none"}, "no-bootstrapping"),
+    "every step is an end": Mistake({"done": "always"}, "no-bootstrapping"),
+    "another discount": Mistake({"discount": 0.6, "declared_discount": 0.95}, "other-discount"),
+    "another gravity": Mistake({"declared_gravity": 10.0, "gravity": 5.0}, "other-gravity"),
+    "reward with the wrong sign": Mistake({"reward": lambda reward: -reward}, "reward-sign"),
+    "reward times 0.01": Mistake({"reward": lambda reward: 0.01 * reward}, "reward-scale"),
+    "reward times 20": Mistake({"reward": lambda reward: 20 * reward}, "reward-scale"),
+    "sine before cosine in learning": Mistake(
+        {"observation": _turn([1, 0, 2], [1, 1, 1])}, "observation-map"
+    ),
+    "speed reversed in learning": Mistake(
+        {"observation": _turn([0, 1, 2], [1, 1, -1])}, "observation-map"
+    ),
+    "torques reversed in learning": Mistake({"torque": lambda torque: -torque}, "torque-map"),
+    "sine before cosine in use": Mistake(
+        {"acting_observation": _turn([1, 0, 2], [1, 1, 1])}, "observation-map"
+    ),
+    "torques reversed in use": Mistake({"acting_torque": lambda torque: -torque}, "torque-map"),
+    "action of the step before": Mistake({"stored_action": "before"}, "misaligned-transitions"),
+}
+
+# What differs between two right programs.
+RIGHT: dict[str, dict[str, Any]] = {
+    "right": {},
+    "gradient through the target": {"through_target": True},
+    "a third of the training": {"steps": 4_000},
+    "a tenth of the training": {"steps": 1_200},
+}
+
+
+def make_program(changes: dict[str, Any], seed: int) -> Program:
+    """Returns a program of a seed: the seed chooses library, task and network."""
+    random = np.random.RandomState(seed)
+    program = Program(
+        library=("torch", "torch", "keras")[random.randint(3)],
+        gravity=(1.0, 10.0, 10.0)[random.randint(3)],
+        torque_count=(3, 5, 9, 11, 21, 41)[random.randint(6)],
+        discount=(0.9, 0.95, 0.98)[random.randint(3)],
+        activation=("relu", "tanh")[random.randint(2)],
+        seed=seed,
+    )
+    return replace(program, **changes)
+
+
+class Network(Protocol):
+    """A network of PyTorch or Keras, with its target network and optimizer."""
+
+    def q_values(self, observations: Array) -> Array:
+        """Returns the values [B, A] of observations [B, 3]."""
+
+    def update(self, batch: tuple[Array, ...]) -> None:
+        """Makes a step of Adam on a batch (s, a, r, s', end)."""
+
+    def copy(self) -> None:
+        """Copies the weights to the target network."""
+
+
+@dataclass
+class Trained:
+    """A trained program: what a user hands in."""
+
+    program: Program
+    weights: list[Array]  # kernel [in, out] and bias of each layer
+    steps: dict[str, Array] = field(default_factory=dict)  # its transitions, in order
+
+    def q_values(self, observations: Array) -> Array:
+        """Returns the values [B, A] of the program in use."""
+        program = self.program
+        features = program.acting_observation(np.asarray(observations, np.float32))
+        hidden = np.tanh if program.activation == "tanh" else lambda x: np.maximum(x, 0)
+        for kernel, bias in zip(self.weights[:-2:2], self.weights[1:-2:2], strict=True):
+            features = hidden(features @ kernel + bias)
+        q = features @ self.weights[-2] + self.weights[-1]
+        if program.head == "softmax":
+            q = np.exp(q - q.max(axis=1, keepdims=True))
+            q = q / q.sum(axis=1, keepdims=True)
+        heads: dict[str, Callable[[Array], Array]] = {
+            "tanh": np.tanh,
+            "sigmoid": lambda x: 1 / (1 + np.exp(-x)),
+            "relu": lambda x: np.maximum(x, 0),
+        }
+        if program.head in heads:
+            q = heads[program.head](q)
+        order = np.argsort(np.argsort(program.acting_torque(program.torques)))
+        return np.asarray(q[:, order])
+
+
+def train(program: Program) -> Trained:
+    """Trains; returns the weights and the steps."""
+    random = np.random.RandomState(program.seed)
+    env = gymnasium.make("Pendulum-v1", g=program.gravity)
+    network = _network(program)
+    torques = program.torque(program.torques)
+    arrays = [np.zeros((program.steps, *shape), kind) for shape, kind in _COLUMNS]
+    observation = None
+    acted, reward_now = 0, 0.0
+    for step in range(program.steps):
+        if observation is None:
+            observation, _ = env.reset(seed=program.seed if step == 0 else None)
+            if program.narrow_starts:
+                env.unwrapped.state = random.uniform(-0.3, 0.3, 2)  # type: ignore[attr-defined]
+                observation = env.unwrapped._get_obs()  # type: ignore
+        seen = program.observation(observation)
+        greedy = int(network.q_values(seen[None])[0].argmax())
+        explores = random.random_sample() < _epsilon(program, step)
+        acted_before, reward_before = acted, reward_now
+        acted = random.randint(len(torques)) if explores else greedy
+        following, reward, _, truncated, _ = env.step([torques[acted]])
+        reward_now = program.reward(float(reward))
+        stored = {"acted": acted, "greedy": greedy, "before": acted_before}[program.stored_action]
+        gained = reward_now if program.stored_reward == "now" else reward_before
+        end = {"never": False, "truncated": truncated, "always": True}[program.done]
+        row = (seen, stored, gained, program.observation(following), end, truncated)
+        for array, value in zip(arrays, row, strict=True):
+            array[step] = value
+        observation = None if truncated else following
+        filled = min(step + 1, program.capacity)
+        if filled >= 64 and step >= 200:
+            first = step + 1 - filled
+            rows = np.arange(step - 63, step + 1)
+            if not program.consecutive:
+                rows = first + random.randint(filled, size=64)
+            network.update(tuple(array[rows] for array in arrays[:5]))
+            if program.copy_every and step % program.copy_every == 0:
+                network.copy()
+    env.close()
+    names = ("observation", "action", "reward", "next_observation", "terminated", "truncated")
+    return Trained(program, network.weights(), dict(zip(names, arrays, strict=True)))
+
+
+_COLUMNS: tuple[tuple[tuple[int, ...], Any], ...] = (
+    ((3,), np.float32),
+    ((), np.int64),
+    ((), np.float32),
+    ((3,), np.float32),
+    ((), np.float32),
+    ((), np.bool_),
+)
+
+
+def _epsilon(program: Program, step: int) -> float:
+    falls = max(0.05, 1 - step / (0.5 * program.steps))
+    return {"falls": falls, "stays": 1.0, "zero": 0.0, "inverted": 1 - falls}[program.epsilon]
+
+
+def _network(program: Program) -> Any:
+    if program.library == "torch":
+        from benchmarks.diagnosis.stranger_torch import TorchNetwork
+
+        return TorchNetwork(program)
+    from benchmarks.diagnosis.stranger_keras import KerasNetwork
+
+    return KerasNetwork(program)

@@ -1,0 +1,131 @@
+"""How often a diagnosis is right about networks of programs that share no code with this package.
+
+    python -m benchmarks.diagnosis.strangers FOLDER [FIRST_SEED ROUNDS]
+
+Trains the programs of `benchmarks.diagnosis.stranger_programs` in FOLDER: one of each mistake in
+each round, and two of each right one. Each program has a seed of its own, from FIRST_SEED on
+(5000). The limits of the equations were set on the seeds 1000 to 4199. The command may be stopped
+and started again: networks and diagnoses in FOLDER are used again. Remove FOLDER/strangers.jsonl
+after a change of the rules. Needs torch. Eight rounds take an hour and a half.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.diagnosis.resumable import Result, measure_each
+from benchmarks.diagnosis.single_faults import counts, share
+from benchmarks.diagnosis.stranger_programs import MISTAKES, RIGHT, Trained, make_program, train
+from benchmarks.result_files import Row, write
+
+KINDS = [*RIGHT, *MISTAKES]
+HEALTHY = ("no finding", "not-converged")
+
+
+def programs(first_seed: int, rounds: int) -> Iterator[tuple[str, int]]:
+    """Yields kind and seed of each program."""
+    for round_ in range(rounds):
+        for number, kind in enumerate(KINDS):
+            seed = first_seed + 100 * number + 2 * round_
+            yield kind, seed
+            if kind in RIGHT:
+                yield kind, seed + 1
+
+
+def train_program(kind: str, seed: int, folder: Path) -> Trained:
+    """Returns the trained program; one in the folder is used again."""
+    changes = RIGHT[kind] if kind in RIGHT else MISTAKES[kind].changes
+    program = make_program(changes, seed)
+    path = folder / f"{kind}_{seed}.npz"
+    if not path.exists():
+        trained = train(program)
+        layers: dict[str, Any] = {
+            f"layer{number:02}": array for number, array in enumerate(trained.weights)
+        }
+        part = path.with_suffix(".part.npz")
+        part.parent.mkdir(parents=True, exist_ok=True)
+        np.savez_compressed(part, **layers | trained.steps)
+        part.rename(path)
+    with np.load(path) as file:
+        names = sorted(name for name in file.files if name.startswith("layer"))
+        steps = {name: file[name] for name in file.files if name not in names}
+        return Trained(program, [file[name] for name in names], steps)
+
+
+def diagnose_program(kind: str, seed: int, folder: Path) -> Result:
+    """Returns the findings on the network of a program, with what its author declares."""
+    import keras_pendulum as kp
+
+    trained = train_program(kind, seed, folder)
+    program = trained.program
+    diagnosis = kp.diagnose(
+        kp.q_function(trained.q_values, program.torques, f"{kind} {seed}"),
+        gravity=program.declared_gravity or program.gravity,
+        discount=program.declared_discount or program.discount,
+    )
+    measurement = diagnosis.measurement
+    return {
+        "kind": kind,
+        "regret": round(measurement.regret, 2),
+        "little": round(measurement.regret_tolerance, 2),
+        "findings": [[finding.name, finding.variant] for finding in diagnosis.findings],
+        "notes": [[finding.name, finding.variant] for finding in diagnosis.notes],
+    }
+
+
+def first(result: Result) -> str:
+    """Returns the first finding, with its variant."""
+    name, variant = [*result["findings"], ["no finding", ""]][0]
+    return f"{name} ({variant})" if variant else name
+
+
+def is_right(result: Result) -> bool:
+    """Returns whether the first finding is right; of a right program, none may be named."""
+    if result["kind"] in RIGHT:
+        return first(result) in HEALTHY
+    mistake = MISTAKES[result["kind"]]
+    return [mistake.finding, mistake.variant] == [*result["findings"], [None]][0]
+
+
+def is_harmless(result: Result) -> bool:
+    """Returns whether a program with a mistake plays so well that it needs no finding."""
+    return result["kind"] in MISTAKES and result["regret"] <= result["little"]
+
+
+def summarize(results: list[Result]) -> list[Row]:
+    """Returns a row for each kind, and one for all mistakes and for all right programs."""
+    rows = [_row(kind, [each for each in results if each["kind"] == kind]) for kind in KINDS]
+    wrong = [each for each in results if each["kind"] in MISTAKES]
+    right = [each for each in results if each["kind"] in RIGHT]
+    return [*rows, _row("all mistakes", wrong), _row("all right programs", right)]
+
+
+def _row(name: str, results: list[Result]) -> Row:
+    costly = [result for result in results if not is_harmless(result)]
+    return {
+        "program": name,
+        "right first finding": share(sum(map(is_right, costly)), len(costly)),
+        "instead": counts(first(each) for each in costly if not is_right(each)),
+        "costs little": len(results) - len(costly),
+    }
+
+
+def main(folder: str, first_seed: str = "5000", rounds: str = "8") -> None:
+    """Trains, diagnoses and writes the results."""
+    items = (
+        (f"{kind} {seed}", partial(diagnose_program, kind, seed, Path(folder)))
+        for kind, seed in programs(int(first_seed), int(rounds))
+    )
+    results = measure_each(items, folder, "strangers")
+    command = f"python -m benchmarks.diagnosis.strangers FOLDER {first_seed} {rounds}"
+    write("diagnosis_strangers", command, summarize(results))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

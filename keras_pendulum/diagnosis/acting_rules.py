@@ -1,0 +1,72 @@
+"""Rules for agents that act in another way than they have learned.
+
+Each returns a finding, or None. `findings` says where the thresholds come from.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from keras_pendulum.diagnosis import comparisons, repairs
+from keras_pendulum.diagnosis.comparisons import SAME_ACTIONS
+from keras_pendulum.diagnosis.faults import Finding
+from keras_pendulum.diagnosis.measurement import Measurement
+
+
+def observation_map(m: Measurement) -> Finding | None:
+    """Finds a change of the observation with which the agent acts as its run."""
+    actions = comparisons.match_actions(m)
+    if actions is None or actions.declared > SAME_ACTIONS:
+        return None
+    if actions.by_observation > max(SAME_ACTIONS, actions.declared + 0.3):
+        evidence = "correlation of the torques with those of the run "
+        evidence += f"{actions.declared:.2f}, with the observation [{actions.observation}] "
+        evidence += f"{actions.by_observation:.2f}"
+        repair = repairs.change_observations(m, actions.observation)
+        return Finding("observation-map", evidence, "best as it is", repair)
+    return None
+
+
+def torque_map(m: Measurement) -> Finding | None:
+    """Finds torques with which the agent acts as its run, or the outputs fit the exact values."""
+    actions = comparisons.match_actions(m)
+    if actions is not None:
+        if actions.declared > SAME_ACTIONS:
+            return None
+        if actions.by_torques > max(SAME_ACTIONS, actions.declared + 0.3):
+            return Finding(
+                "torque-map",
+                f"correlation of the torques with those of the run {actions.declared:.2f}, with "
+                f"each output in its place {actions.by_torques:.2f}",
+                "the same",
+                repairs.change_torques(
+                    m, actions.torques, "each output with the torque that the run stored for it"
+                ),
+            )
+    different = np.unique(m.learned_q, axis=1).shape[1]
+    if 1 < different < m.learned_q.shape[1] / 2:
+        evidence = f"{m.learned_q.shape[1]} outputs with {different} different values"
+        return Finding("torque-map", evidence, "all different")
+    if m.value.correlation < 0.9 or not 0.5 < m.value.slope < 2:
+        return None
+    matched = comparisons.matched_correlation(m)
+    if matched > 0.4 and matched > m.advantage.correlation + 0.2:
+        torques = np.empty_like(m.torques)
+        torques[np.argsort(m.output_torques, kind="stable")] = np.sort(m.torques)
+        name = "each output with the torque that it behaves like"
+        return Finding(
+            "torque-map",
+            f"correlation of the advantages {m.advantage.correlation:.2f}, with each output in "
+            f"its place {matched:.2f}",
+            "the same",
+            repairs.change_torques(m, torques, name),
+        )
+    gain = m.advantage_size / m.value.slope  # noise only makes it larger
+    if m.advantage.correlation > 0.4 and gain < 0.42:
+        return Finding(
+            "torque-map",
+            f"outputs that behave like {gain:.2f} times their torques",
+            "above 0.55 times",
+            repairs.change_torques(m, gain * m.torques, f"torques times {gain:.2g}"),
+        )
+    return None

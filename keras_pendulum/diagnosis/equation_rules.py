@@ -1,0 +1,65 @@
+"""The rules that ask which equation the values obey.
+
+Each returns a finding, or None. `findings` says where the limits come from.
+"""
+
+from __future__ import annotations
+
+from keras_pendulum.diagnosis import comparisons, repairs
+from keras_pendulum.diagnosis.equations import RIGHT, Equation
+from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
+from keras_pendulum.diagnosis.measurement import Measurement
+
+_DIVERGED = 20.0  # spreads above the best possible value: no equation has this fixed point
+_HEALTHY = f"{RIGHT} to 1 to 7 %"
+
+
+def wrong_equation(m: Measurement) -> Finding | None:
+    """Finds another equation that the values obey clearly better than the right one."""
+    if m.excess > _DIVERGED:
+        return None
+    right = m.right_agreement
+    for own, equation in m.agreements:
+        if _is_refuted(m, equation) or not equation.explains(own, right, m.backup):
+            continue
+        repair = _repair(m, equation)
+        if repair is not None and repair.won < 0.5 * m.avoidable_regret:
+            continue  # another equation may explain the values as well
+        evidence = f"the values satisfy {equation.formula} to {_percent(own.error)} and {RIGHT} to "
+        evidence += _percent(right.error)
+        text = Fault(equation.explanation, equation.remedy) if equation.explanation else None
+        return Finding(equation.name, evidence, _HEALTHY, repair, equation.variant, text)
+    return None
+
+
+def not_converged(m: Measurement) -> Finding | None:
+    """Says that the values obey no equation yet."""
+    if m.obeys_right_equation:
+        return None
+    evidence = (
+        f"the values satisfy {RIGHT} to {_percent(m.right_agreement.error)}, and no other equation "
+    )
+    evidence += f"clearly better; correlation of the advantages {m.right_agreement.correlation:.2f}"
+    return Finding("not-converged", evidence, f"{_HEALTHY}; above 0.7")
+
+
+def _percent(error: float) -> str:
+    return f"{error:.0%}".replace("%", " %") if error < 10 else "more than 1000 %"
+
+
+def _is_refuted(m: Measurement, equation: Equation) -> bool:
+    """Returns whether the record of the run shows that this equation is not its own."""
+    if m.record is None:
+        return False
+    if equation.name in ("observation-map", "torque-map"):
+        actions = comparisons.match_actions(m)
+        return actions is not None and actions.declared > comparisons.SAME_ACTIONS
+    return equation.name == "other-gravity"  # the stored transitions have shown which one acted
+
+
+def _repair(m: Measurement, equation: Equation) -> Repair | None:
+    if equation.name == "observation-map":
+        return repairs.change_observations(m, equation.label)
+    if equation.name == "torque-map":
+        return repairs.change_torques(m, -m.torques, equation.label)
+    return None

@@ -1,0 +1,119 @@
+"""Rules for outputs that show no values: not finite, bounded, or the same everywhere.
+
+Each returns a finding, or None. `findings` says where the thresholds come from.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from keras_pendulum.diagnosis.faults import Fault, Finding
+from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.evaluate.q_policies import DQNPolicy
+
+_WORST_REWARD = -Pendulum.reward_range[0]
+_AT_THE_BOUND = 0.3  # share of the outputs; a linear head has none there
+
+
+def not_finite(m: Measurement) -> Finding | None:
+    """Finds values that are not finite or far beyond every possible one."""
+    if not m.finite:
+        return Finding("broken-network", "Q-values that are not finite", "all finite")
+    largest = float(np.abs(m.learned_q).max())
+    limit = _WORST_REWARD / max(1 - m.discount, 0.005)
+    if largest > 1e5 * limit:
+        if m.learned_q.mean() > m.learned_q.std():
+            evidence = f"values of {m.learned_q.mean():.1e}, though no reward is positive"
+            return Finding("overestimation", evidence, "at most 0")
+        return Finding("broken-network", f"values up to {largest:.1e}", f"at most {limit:.0f}")
+    return None
+
+
+def bounded_output(m: Measurement) -> Finding | None:
+    """Finds the traces of an activation after the last layer."""
+    if isinstance(m.policy, DQNPolicy):  # its head is linear
+        return None
+    outputs = m.learned_q * m.reward_scale
+    low, high = float(outputs.min()), float(outputs.max())
+    sums = outputs.sum(axis=1)
+    tiny = bool(((outputs > 0) & (outputs < 1e-6)).any())  # of a ReLU head, all are 0 or larger
+    at_zero, at_minus_one = np.mean(np.abs(outputs) < 1e-3), np.mean(outputs < -0.999)
+    if low >= 0 and np.abs(sums - 1).max() < 1e-3:
+        variant, evidence = (
+            "softmax",
+            "the values of each state are from 0 to 1, and their sum is 1",
+        )
+    elif low >= -1 and high <= 1 and at_minus_one > _AT_THE_BOUND:
+        variant = "tanh"
+        evidence = f"no value is below -1, and {at_minus_one:.0%} of them are there"
+    elif low == 0 and not tiny and at_zero > _AT_THE_BOUND:
+        variant, evidence = "relu", f"no value is below 0, and {at_zero:.0%} of them are there"
+    elif low >= 0 and high <= 1 and at_zero > _AT_THE_BOUND:
+        variant = "sigmoid"
+        evidence = f"all values are from 0 to 1, and {at_zero:.0%} of them are near 0"
+    else:
+        return None
+    text = Fault(
+        f"The last layer ends with {variant}, which cannot give these values. All returns of the "
+        f"pendulum are negative, down to {m.exact_q.min():.0f}.",
+        f"Remove {variant} from the last layer: Q-values need a linear head.",
+    )
+    return Finding("bounded-output", evidence, "no bound", variant=variant, text=text)
+
+
+def same_everywhere(m: Measurement) -> Finding | None:
+    """Finds values that are the same for all states or for all actions."""
+    largest = float(np.abs(m.learned_q).max())
+    units = max(m.units)
+    spread = float(m.learned_q.std(axis=0).max())
+    if spread < 1e-6 * max(1.0, largest):
+        evidence = f"values that differ by {spread:.1g} from state to state"
+        if units > 0.99:
+            evidence += f"; {units:.0%} of a layer's units saturated or dead"
+        return Finding("broken-network", evidence, f"{m.value_spread:.0f}")
+    across = float(np.ptp(m.learned_q, axis=1).max())
+    if across < 1e-6 * max(1.0, largest):
+        return Finding(
+            "broken-network", f"values that differ by {across:.1g} from action to action", "above 1"
+        )
+    return None
+
+
+def batch_broadcast(m: Measurement) -> Finding | None:
+    """Finds values that are the mean target of a batch in all states."""
+    values = m.backup.q
+    mean, spread = float(values.mean()), float(values.std())
+    reward = mean * (1 - m.discount)  # of a step, if this value is the mean target
+    if not values.std(axis=0).any() or max(m.units) > 0.99:  # a dead network
+        return None
+    if spread > 0.3 * m.backup.reward.std() or not 0.02 < reward / -_WORST_REWARD < 0.9:
+        return None
+    text = Fault(
+        "Every value is the mean of all targets, so the loss compares each value with the targets "
+        "of the whole batch. A difference of the shapes (B, 1) and (B,) has the shape (B, B).",
+        "Give Q(s, a) and the target the same shape: squeeze the first one, or reshape the other "
+        "one to (B, 1).",
+    )
+    return Finding(
+        "wrong-loss",
+        f"values of {mean:.0f} in all states: they differ by {spread:.2g}, the rewards by "
+        f"{m.backup.reward.std():.2g}",
+        f"a difference of {m.value_spread:.0f}",
+        variant="batch-broadcast",
+        text=text,
+    )
+
+
+def reward_size(m: Measurement) -> Finding | None:
+    """Finds values beyond the lowest possible one, or lost in the noise of the weights."""
+    lowest = -_WORST_REWARD / max(1 - m.discount, 0.005)
+    mean = float(m.learned_q.mean())
+    if mean < lowest:
+        evidence = f"a mean value of {mean:.3g}"
+        return Finding("reward-scale", evidence, f"above {lowest:.0f}, the lowest possible")
+    slope = m.value.slope
+    if 0 <= slope < 0.02 and m.advantage_size < 0.03 and m.value.correlation > 0.5:
+        evidence = f"values {slope:.1g} times the exact ones, and actions as close"
+        return Finding("reward-scale", evidence, "1")
+    return None

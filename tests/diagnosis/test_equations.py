@@ -1,0 +1,149 @@
+"""Tests that a network is told which equation it obeys, by the exact solution of each equation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
+
+import keras_pendulum as kp
+
+LAST = len(TORQUES) - 1
+UNTRAINED = np.random.RandomState(3).normal(size=(3, 5)) * 0.1
+
+
+def right(r: Any, following: Any, own: Any) -> Any:
+    return r + DISCOUNT * following.max(axis=2)
+
+
+def diagnose(q_values: Callable[[Any], Any], **options: Any) -> kp.Diagnosis:
+    declared = {"gravity": GRAVITY, "discount": DISCOUNT, **options}
+    return kp.diagnose(kp.q_function(q_values, TORQUES, "a student's"), **declared)
+
+
+def first(diagnosis: kp.Diagnosis) -> str:
+    """Returns the first finding; of an agent that plays well, the first note."""
+    found = [*diagnosis.findings, *diagnosis.notes]
+    return found[0].title if found else "no finding"
+
+
+TARGETS: dict[str, Any] = {
+    "wrong-target (mean-next)": lambda r, following, own: r + 0.9 * following.mean(axis=2),
+    "wrong-target (min-next)": lambda r, following, own: r + 0.9 * following.min(axis=2),
+    "wrong-target (same-state)": lambda r, following, own: r + 0.9 * own.max(axis=1, keepdims=True),
+    "wrong-loss (zero-others)": lambda r, following, own: right(r, following, own) / len(TORQUES),
+    "wrong-loss (same-target)": lambda r, following, own: (
+        right(r, following, own).mean(axis=1, keepdims=True) + 0 * r
+    ),
+    "no-bootstrapping": lambda r, following, own: r,
+    "wrong-target (batch-max)": lambda r, following, own: r - 2.5,
+    "reward-sign": lambda r, following, own: right(-r, following, own),
+    "reward-scale": lambda r, following, own: right(0.01 * r, following, own),
+    "other-discount": lambda r, following, own: r + 0.5 * following.max(axis=2),
+}
+
+
+@pytest.mark.parametrize("finding", TARGETS)
+def test_solution_of_a_wrong_equation_is_named(finding: str) -> None:
+    diagnosis = diagnose(fixed_point(TARGETS[finding]))
+    assert first(diagnosis) == finding
+    assert "the values satisfy " in diagnosis.summary()
+
+
+@pytest.mark.parametrize(("action", "word"), [(0, "first"), (LAST, "last")])
+def test_value_of_one_next_action_is_named_with_it(action: int, word: str) -> None:
+    def target(r: Any, following: Any, own: Any) -> Any:
+        return r + DISCOUNT * following[:, :, action]
+
+    diagnosis = diagnose(fixed_point(target))
+    assert first(diagnosis) == "wrong-target (fixed-action-next)"
+    assert f"Q(s′, {word} action) to " in diagnosis.verdict
+
+
+def test_solution_of_the_right_equation_has_no_finding() -> None:
+    diagnosis = diagnose(fixed_point(right))
+    assert diagnosis.findings == []
+    assert diagnosis.measurement.right_agreement.error < 0.03
+
+
+@pytest.mark.parametrize("sweeps", [2, 5, 10, 20, 40])
+def test_right_program_that_has_not_converged_is_not_blamed(sweeps: int) -> None:
+    assert first(diagnose(fixed_point(right, sweeps))) in ("not-converged", "no finding")
+
+
+def test_target_network_that_is_never_copied_is_named() -> None:
+    values = fixed_point(TARGETS["no-bootstrapping"])
+    diagnosis = diagnose(lambda o: values(o) + 0.3 + 0.9 * (o @ UNTRAINED).max(axis=1)[:, None])
+    assert first(diagnosis) == "wrong-target (frozen-target)"
+
+
+def test_index_in_place_of_the_value_is_named() -> None:
+    values = fixed_point(TARGETS["no-bootstrapping"])
+    diagnosis = diagnose(lambda o: values(o) + 2 + 1.5 * np.sin(7 * o @ UNTRAINED))
+    assert first(diagnosis) == "wrong-target (index-for-value)"
+
+
+@pytest.mark.parametrize(
+    ("variant", "head"),
+    [
+        ("softmax", lambda q: np.exp(q) / np.exp(q).sum(axis=1, keepdims=True)),
+        ("tanh", np.tanh),
+        ("sigmoid", lambda q: 1 / (1 + np.exp(-q))),
+        ("relu", lambda q: np.maximum(q, 0)),
+    ],
+)
+def test_bounded_head_is_named(variant: str, head: Callable[[Any], Any]) -> None:
+    values = fixed_point(right)
+    assert first(diagnose(lambda o: head(values(o)))) == f"bounded-output ({variant})"
+
+
+def test_mean_of_the_batch_in_all_states_is_named() -> None:
+    values = fixed_point(right)
+    diagnosis = diagnose(lambda o: -60 + 0.002 * values(o))
+    assert first(diagnosis) == "wrong-loss (batch-broadcast)"
+
+
+@pytest.mark.parametrize(
+    ("finding", "seen"),
+    [
+        ("observation-map", lambda o: o[:, [1, 0, 2]]),
+        ("observation-map", lambda o: o * np.array([1, 1, -1])),
+        ("observation-map", lambda o: o * np.array([1, 1, 180 / np.pi])),
+    ],
+)
+def test_changed_observation_is_named_and_repaired(finding: str, seen: Any) -> None:
+    values = fixed_point(right)
+    diagnosis = diagnose(lambda o: values(seen(o)))
+    assert first(diagnosis) == finding
+    assert diagnosis.findings[0].repair is not None and diagnosis.findings[0].repair.regret < 100
+
+
+def test_reversed_torques_are_named_and_repaired() -> None:
+    values = fixed_point(right)
+    diagnosis = diagnose(lambda o: values(o)[:, ::-1])
+    assert first(diagnosis) == "torque-map"
+    assert diagnosis.findings[0].repair is not None
+
+
+def test_other_gravity_is_named_with_it() -> None:
+    diagnosis = diagnose(fixed_point(right), gravity=1.0)
+    assert first(diagnosis) == "other-gravity"
+    assert "g = 10" in diagnosis.summary()
+
+
+def test_declared_scale_of_the_rewards_is_no_fault() -> None:
+    values = fixed_point(TARGETS["reward-scale"])
+    assert first(diagnose(values, reward_scale=0.01)) == "no finding"
+
+
+@pytest.mark.parametrize("kind", ["function", "network"])
+def test_values_that_are_not_numbers_are_a_broken_network(kind: str) -> None:
+    network = kp.DQN((4,), action_count=5)
+    network.set_weights([np.nan * array for array in network.get_weights()])
+    agent = network if kind == "network" else kp.q_function(lambda o: np.full((len(o), 5), np.nan))
+    diagnosis = kp.diagnose(agent)
+    assert first(diagnosis) == "broken-network"
+    assert "not finite" in diagnosis.summary()

@@ -1,0 +1,86 @@
+"""Tests of agents that give no Q-values: only repairs can be tried."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
+
+import keras_pendulum as kp
+from keras_pendulum.diagnosis import diagnosis as module
+
+
+def right(r: Any, following: Any, own: Any) -> Any:
+    return r + DISCOUNT * following.max(axis=2)
+
+
+def greedy(observation: Any) -> float:
+    """Returns the torque of a healthy network in N·m."""
+    q = fixed_point(right)(np.atleast_2d(observation))
+    return float(TORQUES[q.argmax(axis=1)][0])
+
+
+def diagnose(agent: Any, **options: Any) -> kp.Diagnosis:
+    return kp.diagnose(agent, gravity=GRAVITY, discount=DISCOUNT, **options)
+
+
+@pytest.fixture
+def few_starts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Takes every function for a slow one."""
+    monkeypatch.setattr(module, "_STARTS_BY_SECONDS", ((np.inf, 4),))
+
+
+@pytest.mark.usefixtures("few_starts")
+@pytest.mark.parametrize(
+    ("agent", "finding", "repair"),
+    [
+        (lambda o: -greedy(o), "torque-map", "torque reversed"),
+        (lambda o: 0.4 * greedy(o), "torque-map", "double the torque"),
+        (lambda o: greedy(o * np.array([1, 1, -1])), "observation-map", "observation ["),
+    ],
+)
+def test_simple_repair_is_found(agent: Any, finding: str, repair: str) -> None:
+    diagnosis = diagnose(agent)
+    (found,) = diagnosis.findings
+    assert found.name == finding
+    assert found.repair is not None and found.repair.name.startswith(repair)
+    assert found.repair.won > 0.5 * diagnosis.measurement.avoidable_regret
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_nothing_is_guessed_about_a_constant_torque() -> None:
+    diagnosis = diagnose(lambda observation: 0.0)
+    assert diagnosis.findings == []
+    assert diagnosis.verdict.startswith("Undetermined: regret ")
+    assert "it gives the same torque at all starts" in diagnosis.verdict
+    assert "Train" not in diagnosis.summary()
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_policy_with_a_state_plays_one_episode_after_the_other() -> None:
+    class Repeats:
+        """Chooses a torque at every second step only."""
+
+        def __init__(self) -> None:
+            self.calls, self.torque = 0, 0.0
+
+        def __call__(self, observation: Any) -> float:
+            if self.calls % 2 == 0:
+                self.torque = greedy(observation)
+            self.calls += 1
+            return self.torque
+
+    regret = diagnose(Repeats()).measurement.regret
+    score = kp.evaluate_policy(Repeats(), 4, gravity=GRAVITY)
+    assert regret == pytest.approx(score.regret, abs=0.5)
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_slow_policy_plays_fewer_starts_and_reports_its_progress() -> None:
+    shares: list[float] = []
+    diagnosis = diagnose(lambda observation: 0.0, on_progress=shares.append)
+    assert diagnosis.as_json()["starts"] == 4
+    assert ", 4 starts; " in diagnosis.summary()
+    assert shares == sorted(shares) and 0 < shares[0] < shares[-1] <= 1
