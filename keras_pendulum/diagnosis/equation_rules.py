@@ -10,15 +10,16 @@ from keras_pendulum.diagnosis.equations import RIGHT, Equation
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
 
+_RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _DIVERGED = 20.0  # spreads above the best possible value: no equation has this fixed point
 _HEALTHY = f"{RIGHT} to 1 to 7 %"
 
 
 def wrong_equation(m: Measurement) -> Finding | None:
     """Finds another equation that the values obey clearly better than the right one."""
-    if m.excess > _DIVERGED:
-        return None
     right = m.right_agreement
+    if m.excess > _DIVERGED or right.error < _RIGHT_ERROR:
+        return None
     for own, equation in m.agreements:
         if _is_refuted(m, equation) or not equation.explains(own, right, m.backup):
             continue

@@ -41,23 +41,24 @@ class Equation:
     largest_error: float = 0.25
     share: float = 0.88  # of the right equation's error that it may have at most
     flat: float = 0.0  # above 0: the advantages of Q are at most this share of the right ones
-    offset: bool | None = None  # of one without next values: whether Q - r is as it says
+    offset: bool = False  # whether it has no next values, and Q - r is as it says
     change: dict[str, Any] | None = None  # arguments of `Visited.backup`
+    steepest: float = 1.3  # the same: the largest slope of Q over r
     label: str = ""  # what differs from the declared task
 
     def explains(self, own: Agreement, right: Agreement, declared: Backup) -> bool:
         """Returns whether the network obeys this equation clearly better than the right one."""
         if own.error > min(self.largest_error, self.share * right.error):
             return False
-        if self.offset is not None:
-            slope = line_fit(declared.q, declared.reward).slope
-            return self.offset and 0.6 < slope < 1.3
+        if self.offset:
+            return 0.6 < line_fit(declared.q, declared.reward).slope < self.steepest
         if self.change is None and not 0.7 < own.position < 1.35:
             return False
         if self.flat == np.inf:
             return True
         if self.flat:
-            return own.advantages <= self.flat and right.correlation < 0.65
+            # A negative correlation is that of reversed torques.
+            return own.advantages <= self.flat and -0.3 < right.correlation < 0.65
         return own.correlation > 0.3 or own.error < 0.03
 
 
@@ -68,7 +69,8 @@ def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, 
         visited: the network.
         declared: its values for the declared task.
     """
-    for equation in (*EQUATIONS, *_offsets(declared), *_changes(visited, declared)):
+    offsets = (each for each in _offsets(declared) if each.offset)
+    for equation in (*EQUATIONS, *offsets, *_changes(visited, declared)):
         values = visited.backup(**equation.change) if equation.change else declared
         yield agreement(values, equation.target(values)), equation
 
@@ -169,8 +171,8 @@ def _offsets(declared: Backup) -> Iterator[Equation]:
 
     offset, last = declared.offset, declared.q.shape[1] - 1
     mean = float(offset.mean())
-    frozen = bool(declared.offset_is_smooth and offset.std() > 0.06 and mean > -0.1)
-    indices = float(np.mean((offset > -0.3) & (offset < last))) > 0.9
+    frozen = bool(declared.offset_is_smooth and offset.std() > 0.06 and -0.1 < mean < 2)
+    indices = float(np.mean((offset > -0.3) & (offset < last))) > 0.8
     yield Equation(
         "no-bootstrapping",
         "",
@@ -213,6 +215,7 @@ def _offsets(declared: Backup) -> Iterator[Equation]:
         "Use max in the target; argmax is for acting.",
         largest_error=0.9,
         offset=indices and mean > max(0.5, 0.15 * last),
+        steepest=1.8,
     )
 
 
@@ -244,7 +247,8 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
     for gravity in () if falling else _GRAVITIES:
         if abs(gravity - visited.gravity) > 0.3 * visited.gravity:
             yield _changed("other-gravity", f"g = {gravity:g}", gravity=gravity)
-    yield _changed("torque-map", "torques reversed", torques=-visited.torques)
+    # The sign of the correlation is the main evidence.
+    yield _changed("torque-map", "torques reversed", share=0.95, torques=-visited.torques)
     for name in OBSERVATION_CHANGES:
         yield _changed("observation-map", name, observation=name)
 
@@ -253,7 +257,7 @@ def _discounted(discount: float, values: Backup) -> Array:
     return values.reward + discount * values.next_q.max(axis=2)
 
 
-def _changed(name: str, label: str, **change: Any) -> Equation:
+def _changed(name: str, label: str, share: float = 0.75, **change: Any) -> Equation:
     """Returns the right equation of a changed backup."""
     shown = f"the observation [{label}]" if name == "observation-map" else label
     return Equation(
@@ -261,7 +265,7 @@ def _changed(name: str, label: str, **change: Any) -> Equation:
         "",
         f"{RIGHT} with {shown}",
         lambda b: b.right,
-        share=0.75,
+        share=share,
         change=change,
         label=label,
     )

@@ -19,7 +19,7 @@ from keras_pendulum.optimum.value_iteration import value_at
 Act = Callable[[NDArray[np.float32]], Array]
 
 _STATES = 1500  # of each other kind
-_VISITED = 300
+_VISITED = 200
 
 
 def observe(states: Array) -> NDArray[np.float32]:
@@ -69,7 +69,7 @@ def simulate(act: Act, gravity: float, starts: Array) -> Episodes:
 
 
 def visited_states(q_values: Act, torques: Array, gravity: float, starts: Array) -> Array:
-    """Returns 300 states [N, 2] that a network visits, with 10 to 100 % of random torques.
+    """Returns 200 states [N, 2] that a network visits, with 10 to 100 % of random torques.
 
     Args:
         q_values: from observations [B, 3] to Q-values [B, A].

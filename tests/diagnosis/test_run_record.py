@@ -121,11 +121,12 @@ def test_another_gravity_of_the_stored_transitions_is_named(record: RunRecord) -
 
 
 def test_stored_transitions_exclude_another_gravity(record: RunRecord) -> None:
-    def two(observations: Any) -> Any:
-        return exact_values(observations, gravity=2.0)
+    def five(observations: Any) -> Any:
+        return exact_values(observations, gravity=5.0)
 
-    assert diagnose_values(two).notes[0].name == "other-gravity"
-    diagnosis = diagnose_values(two, record)
+    diagnosis = diagnose_values(five)
+    assert (diagnosis.findings + diagnosis.notes)[0].name == "other-gravity"
+    diagnosis = diagnose_values(five, record)
     assert "other-gravity" not in [each.name for each in diagnosis.findings + diagnosis.notes]
 
 
