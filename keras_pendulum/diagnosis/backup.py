@@ -30,7 +30,7 @@ class Backup(NamedTuple):
 
     @property
     def offset(self) -> Array:
-        """What the values add to the rewards of one step, [N, A]."""
+        """The values minus the rewards of one step, [N, A]."""
         return self.q - self.reward
 
     @property
@@ -92,7 +92,7 @@ class Visited:
 
 
 class Agreement(NamedTuple):
-    """How well a network obeys an equation."""
+    """The agreement of a network with an equation."""
 
     error: float  # root mean square of Q minus target, as a share of the spread of Q
     correlation: float  # of the advantages of Q with those of the target

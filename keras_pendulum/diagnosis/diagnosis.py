@@ -79,7 +79,7 @@ class Diagnosis:
 
     @property
     def declared(self) -> str:
-        """What the agent is compared with: gravity, discount, torques and size of the reward."""
+        """The declared task: gravity, discount, torques and size of the reward."""
         m = self.measurement
         text = f"g = {m.task.gravity:g}, γ = {m.discount:g}"
         if m.policy.actions is not None:

@@ -192,7 +192,7 @@ class Measurement:
 
     @cached_property
     def right_agreement(self) -> Agreement:
-        """How well the values obey the right equation of the declared task."""
+        """The agreement of the values with the right equation of the declared task."""
         return agreement(self.backup, self.backup.right)
 
     @cached_property

@@ -10,6 +10,8 @@ import pytest
 from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
 
 import keras_pendulum as kp
+from keras_pendulum.diagnosis.backup import Agreement
+from keras_pendulum.diagnosis.equations import Equation
 
 LAST = len(TORQUES) - 1
 UNTRAINED = np.random.RandomState(3).normal(size=(3, 5)) * 0.1
@@ -72,6 +74,43 @@ def test_solution_of_the_right_equation_has_no_finding() -> None:
 @pytest.mark.parametrize("sweeps", [2, 5, 10, 20, 40])
 def test_right_program_that_has_not_converged_is_not_blamed(sweeps: int) -> None:
     assert first(diagnose(fixed_point(right, sweeps))) in ("not-converged", "no finding")
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_right_values_with_an_error_are_not_blamed(size: float, seed: int) -> None:
+    values, waves = fixed_point(right), np.random.RandomState(seed).normal(size=(3, 5))
+    diagnosis = diagnose(lambda o: values(o) + size * np.sin(2 * o @ waves))
+    assert first(diagnosis) in ("not-converged", "no finding")
+
+
+@pytest.mark.parametrize(
+    ("changes", "explains"),
+    [
+        ({}, True),
+        ({"error": 0.19}, False),  # hardly less than that of the right equation
+        ({"position": 0.4}, False),
+        ({"correlation": 0.1}, False),
+    ],
+)
+def test_equation_needs_a_margin(changes: dict[str, float], explains: bool) -> None:
+    equation = Equation("wrong-target", "", "", lambda b: b.right)
+    declared = diagnose(fixed_point(right)).measurement.backup
+    own, best = Agreement(0.1, 0.9, 1.0, 1.0), Agreement(0.2, 0.5, 1.0, 0.0)
+    assert equation.explains(own._replace(**changes), best, declared) is explains
+
+
+@pytest.mark.parametrize(
+    ("advantages", "correlation", "explains"),
+    [(0.2, 0.1, True), (0.5, 0.1, False), (0.2, -0.6, False)],
+)
+def test_equation_without_advantages_needs_flat_values(
+    advantages: float, correlation: float, explains: bool
+) -> None:
+    equation = Equation("wrong-loss", "", "", lambda b: b.right, flat=0.4)
+    declared = diagnose(fixed_point(right)).measurement.backup
+    own = Agreement(0.1, 0.0, advantages, 1.0)
+    assert equation.explains(own, Agreement(0.2, correlation, 1.0, 0.0), declared) is explains
 
 
 def test_target_network_that_is_never_copied_is_named() -> None:
