@@ -37,16 +37,11 @@ class Program:
     head: str = "linear"  # activation of the last layer
     copy_every: int = 50  # updates between two copies to the target network; 0 is never
     through_target: bool = False  # whether the gradient passes the target
-    done: str = "never"  # which transitions end: never, truncated or always
+    ends_always: bool = False  # whether every transition ends its episode
     observation: Callable[[Array], Array] = lambda observation: observation  # in learning
     reward: Callable[[float], float] = lambda reward: reward
     torque: Callable[[Array], Array] = lambda torque: torque  # in learning
-    stored_action: str = "acted"
-    stored_reward: str = "now"
-    capacity: int = 50_000  # of the replay buffer
-    consecutive: bool = False  # whether a batch is the last rows
-    epsilon: str = "falls"
-    narrow_starts: bool = False
+    stores_action_before: bool = False
     # The program in use, after learning:
     acting_observation: Callable[[Array], Array] = lambda observation: observation
     acting_torque: Callable[[Array], Array] = lambda torque: torque
@@ -95,7 +90,7 @@ MISTAKES: dict[str, Mistake] = {
     "sigmoid head": Mistake({"head": "sigmoid"}, "bounded-output", "sigmoid"),
     "ReLU head": Mistake({"head": "relu"}, "bounded-output", "relu"),
     "no lookahead": Mistake({"target": "none"}, "no-bootstrapping"),
-    "every step is an end": Mistake({"done": "always"}, "no-bootstrapping"),
+    "every step is an end": Mistake({"ends_always": True}, "no-bootstrapping"),
     "another discount": Mistake({"discount": 0.6, "declared_discount": 0.95}, "other-discount"),
     "another gravity": Mistake({"declared_gravity": 10.0, "gravity": 5.0}, "other-gravity"),
     "reward with the wrong sign": Mistake({"reward": lambda reward: -reward}, "reward-sign"),
@@ -112,7 +107,7 @@ MISTAKES: dict[str, Mistake] = {
         {"acting_observation": _turn([1, 0, 2], [1, 1, 1])}, "observation-map"
     ),
     "torques reversed in use": Mistake({"acting_torque": lambda torque: -torque}, "torque-map"),
-    "action of the step before": Mistake({"stored_action": "before"}, "misaligned-transitions"),
+    "action of the step before": Mistake({"stores_action_before": True}, "misaligned-transitions"),
 }
 
 # What differs between two right programs.
@@ -189,33 +184,25 @@ def train(program: Program) -> Trained:
     torques = program.torque(program.torques)
     arrays = [np.zeros((program.steps, *shape), kind) for shape, kind in _COLUMNS]
     observation = None
-    acted, reward_now = 0, 0.0
+    acted = 0
     for step in range(program.steps):
         if observation is None:
             observation, _ = env.reset(seed=program.seed if step == 0 else None)
-            if program.narrow_starts:
-                env.unwrapped.state = random.uniform(-0.3, 0.3, 2)  # type: ignore[attr-defined]
-                observation = env.unwrapped._get_obs()  # type: ignore
         seen = program.observation(observation)
         greedy = int(network.q_values(seen[None])[0].argmax())
         explores = random.random_sample() < _epsilon(program, step)
-        acted_before, reward_before = acted, reward_now
+        acted_before = acted
         acted = random.randint(len(torques)) if explores else greedy
         following, reward, _, truncated, _ = env.step([torques[acted]])
-        reward_now = program.reward(float(reward))
-        stored = {"acted": acted, "greedy": greedy, "before": acted_before}[program.stored_action]
-        gained = reward_now if program.stored_reward == "now" else reward_before
-        end = {"never": False, "truncated": truncated, "always": True}[program.done]
-        row = (seen, stored, gained, program.observation(following), end, truncated)
+        stored = acted_before if program.stores_action_before else acted
+        gained = program.reward(float(reward))
+        following_seen = program.observation(following)
+        row = (seen, stored, gained, following_seen, program.ends_always, truncated)
         for array, value in zip(arrays, row, strict=True):
             array[step] = value
         observation = None if truncated else following
-        filled = min(step + 1, program.capacity)
-        if filled >= 64 and step >= 200:
-            first = step + 1 - filled
-            rows = np.arange(step - 63, step + 1)
-            if not program.consecutive:
-                rows = first + random.randint(filled, size=64)
+        if step >= 200:
+            rows = random.randint(step + 1, size=64)
             network.update(tuple(array[rows] for array in arrays[:5]))
             if program.copy_every and step % program.copy_every == 0:
                 network.copy()
@@ -235,8 +222,7 @@ _COLUMNS: tuple[tuple[tuple[int, ...], Any], ...] = (
 
 
 def _epsilon(program: Program, step: int) -> float:
-    falls = max(0.05, 1 - step / (0.5 * program.steps))
-    return {"falls": falls, "stays": 1.0, "zero": 0.0, "inverted": 1 - falls}[program.epsilon]
+    return max(0.05, 1 - step / (0.5 * program.steps))
 
 
 def _network(program: Program) -> Any:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STARTS_BY_SECONDS = ((2e-3, STARTS), (1e-2, 12), (math.inf, 4))  # of one call
-_PLAYS = 8 + 5  # of all starts without Q-values: as it is, the repairs, the choice among them
+_PLAYS = 10  # of all starts, at most, for a policy without Q-values
 _BARE_POLICY = "without Q-values, faults of the training cannot be seen"
 _NO_RUN = (
     "number of updates, learning rate, exploration, narrow starts and a small replay buffer leave "
