@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from keras_pendulum.config.config import Config
     from keras_pendulum.config.presets import preset
     from keras_pendulum.diagnosis.diagnosis import Diagnosis, diagnose
+    from keras_pendulum.diagnosis.recorder import Recorder
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
     from keras_pendulum.evaluate.evaluation import evaluate_policy
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from keras_pendulum.evaluate.q_policies import q_function
     from keras_pendulum.evaluate.score import Score
     from keras_pendulum.evaluate.sources import load_policy
-    from keras_pendulum.optimum.optimal_return import optimal_return
+    from keras_pendulum.optimum.solutions import optimal_return
     from keras_pendulum.storage.find_weights import find_weights
     from keras_pendulum.storage.load_weights import load_weights
     from keras_pendulum.storage.save_weights import save_weights
@@ -39,6 +40,7 @@ __all__ = [
     "ConfigError",
     "Diagnosis",
     "Policy",
+    "Recorder",
     "Score",
     "TrainingResult",
     "UserError",
@@ -63,6 +65,7 @@ _MODULES = {
     "DQN": "dqn.network",
     "Diagnosis": "diagnosis.diagnosis",
     "Policy": "evaluate.policy",
+    "Recorder": "diagnosis.recorder",
     "Score": "evaluate.score",
     "TrainingResult": "train.train_dqn",
     "UserError": "errors",
@@ -72,7 +75,7 @@ _MODULES = {
     "find_weights": "storage.find_weights",
     "load_policy": "evaluate.sources",
     "load_weights": "storage.load_weights",
-    "optimal_return": "optimum.optimal_return",
+    "optimal_return": "optimum.solutions",
     "preset": "config.presets",
     "q_function": "evaluate.q_policies",
     "save_weights": "storage.save_weights",

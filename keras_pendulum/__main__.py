@@ -29,6 +29,7 @@ COMMANDS = {
     "play": "drive the pendulum by hand, then watch a policy from the same start",
     "page": "write a page for the browser that shows a policy",
     "compare": "draw the learning curves and regrets of several runs",
+    "exercise": "find the fault in a DQN program",
     "study": "train variants with many seeds, and compare their regrets",
 }
 

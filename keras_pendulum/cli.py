@@ -127,6 +127,17 @@ def add_torques_flag(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_environment_flag(parser: argparse.ArgumentParser) -> None:
+    """Adds the flag for agents that record no task."""
+    parser.add_argument(
+        "--environment",
+        choices=("Pendulum-v1", "CartPole-v1"),
+        metavar="NAME",
+        help="Pendulum-v1 or CartPole-v1 [recorded in the file, else CartPole-v1 for an agent that "
+        "takes four numbers]",
+    )
+
+
 def _numbers(text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]

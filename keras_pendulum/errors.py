@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_LONGEST = 300  # characters of a message
+LONGEST = 300  # characters of a message
 
 
 class UserError(Exception):
@@ -28,7 +28,7 @@ class WeightsError(UserError, ValueError):
 
 
 class UnknownLayersError(WeightsError):
-    """A whole model that is no chain of Dense layers."""
+    """A network that is not a chain of Dense layers."""
 
 
 def require_type(name: str, value: object, expected: type | tuple[type, ...]) -> None:
@@ -58,7 +58,7 @@ def did_you_mean(word: str, names: Iterable[str]) -> str:
     import difflib
 
     by_lower_case = {name.lower(): name for name in names}
-    beginning = word[:_LONGEST].lower()  # a much longer one takes long to compare
+    beginning = word[:LONGEST].lower()  # a much longer one takes long to compare
     found = [name for name in by_lower_case if len(beginning) > 2 and name.startswith(beginning)]
     found = sorted(found, key=len)  # the word itself is the first
     found += difflib.get_close_matches(beginning, by_lower_case, 1)
@@ -75,7 +75,7 @@ def one_line(message: str) -> str:
         character if character.isprintable() else character.encode("unicode_escape").decode()
         for character in message
     )
-    if len(line) <= _LONGEST:
+    if len(line) <= LONGEST:
         return line
-    half = _LONGEST // 2
+    half = LONGEST // 2
     return f"{line[: half - 1]}…{line[-half:]}"

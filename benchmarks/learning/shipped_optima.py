@@ -2,8 +2,9 @@
 
     python -m benchmarks.learning.shipped_optima [FOLDER]
 
-Computes the best possible returns of the seeds 0 to 9999. Computes those of the optimal policy for
-the discount of `reference` and `swingup` for the seeds 0 to 999. It takes some ten minutes.
+Computes the best possible returns of the pendulum for the seeds 0 to 9999, and those of the optimal
+policy for the discount of `reference` and `swingup` for the seeds 0 to 999. Computes the optimal
+values of CartPole for the usual discounts. It takes some ten minutes.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy as np
 
 from keras_pendulum.environments.pendulum import pendulum_starts
 from keras_pendulum.optimum.best_return import compute_returns
-from keras_pendulum.optimum.stored_results import Problem, write
+from keras_pendulum.optimum.cartpole_values import file_name, pack, solve_cartpole
+from keras_pendulum.optimum.stored_results import Problem, write, write_arrays
 
 DATA = Path(__file__).parents[2] / "keras_pendulum" / "optimum" / "data"
 # Gravity and discount of `reference` and `swingup`, with the steps of a whole and of a training
@@ -26,16 +28,21 @@ SHIPPED = [
     for steps in (200, training_steps)
     for discount in (1.0, own_discount)
 ]
+CARTPOLE_DISCOUNTS = (0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
 
 
 def main(folder: str = str(DATA)) -> None:
-    """Computes the returns and writes the files into an existing folder."""
+    """Computes returns and values, and writes the files into an existing folder."""
     for problem in SHIPPED:
         seeds = range(10_000 if problem.discount == 1 else 1000)
         returns = compute_returns(problem, pendulum_starts(seeds))
         path = Path(folder) / problem.file_name
         write(path, problem, seeds=np.array(seeds), returns=returns)
         print(f"{path}: mean {returns.mean():.4f}")
+    for discount in CARTPOLE_DISCOUNTS:
+        path, table = Path(folder) / file_name(discount), solve_cartpole(discount)
+        write_arrays(path, pack(table))
+        print(f"{path}: mean {table.mean():.4f}")
 
 
 if __name__ == "__main__":

@@ -9,8 +9,19 @@ from typing import Any
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
+from keras_pendulum.errors import ConfigError
 
 TASKS: dict[str, type[Task]] = {task.environment: task for task in (Pendulum, CartPole)}
+
+
+def declared_task(environment: str) -> Task:
+    """Returns the task of an environment that a user names, with its usual physics.
+
+    Raises ConfigError for an unknown name.
+    """
+    if environment not in TASKS:
+        raise ConfigError(f"environment is {environment!r}; expected {' or '.join(TASKS)}")
+    return TASKS[environment]()
 
 
 def make_task(environment: str, settings: Mapping[str, Any]) -> Task:

@@ -13,6 +13,7 @@ from typing import Any
 from keras_pendulum.cli import (
     OneLineParser,
     add_activation_flag,
+    add_environment_flag,
     add_torques_flag,
     print_json,
     prints_to_stderr,
@@ -48,6 +49,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         metavar="N",
         help="seed of the first start; episode i starts from seed N + i [0]",
     )
+    add_environment_flag(parser)
     parser.add_argument(
         "--gravity",
         type=float,
@@ -86,7 +88,9 @@ def _evaluate(arguments: argparse.Namespace) -> int:
             raise UserError("the window was closed before the end of the last episode")
 
     with prints_to_stderr() if arguments.json else contextlib.nullcontext():
-        policy = named_policy(arguments.agent, arguments.torques, arguments.activation)
+        policy = named_policy(
+            arguments.agent, arguments.torques, arguments.activation, arguments.environment
+        )
         with status("Evaluating") as report:
             score = evaluate_policy(
                 policy,

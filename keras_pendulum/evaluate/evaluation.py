@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from keras_pendulum.config.fields import Integer, Number
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
-from keras_pendulum.errors import ConfigError, UserError
+from keras_pendulum.errors import UserError
 from keras_pendulum.evaluate.answers import ActionError
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.score import Score
@@ -24,8 +25,10 @@ from keras_pendulum.status import Report
 
 Env = gymnasium.Env[Any, Any]
 OnStep = Callable[[Env], None]
+Path = NDArray[np.float32]  # [T, D]
 USUAL_GRAVITIES = (10.0, 1.0)  # m/s², Gymnasium's default and that of the presets
 _SIDE_BY_SIDE = 100  # episodes
+_PATHS, _PATH_STEPS = 1000, 100  # that are kept: of the first episodes, their last steps
 _STARTS_OF_A_TRIAL = 5
 
 
@@ -34,6 +37,7 @@ def evaluate_policy(
     episodes: int = 100,
     seed: int = 0,
     *,
+    environment: str | None = None,
     gravity: float | None = None,
     discount: float | None = None,
     torques: ArrayLike | None = None,
@@ -45,10 +49,12 @@ def evaluate_policy(
 
     Args:
         agent: a network, its policy, the path or shipped name of its file, a run folder, a Keras
-            model, a function from an observation to a torque in N·m or to an index of `torques`, a
-            `q_function`, or an object with `predict`.
+            model, a function from an observation to a torque in N·m or to an index, a `q_function`,
+            or an object with `predict`.
         episodes: number of episodes.
         seed: seed of the first start.
+        environment: `Pendulum-v1` or `CartPole-v1`; None takes the recorded one, else CartPole-v1
+            for an agent that takes four numbers, else Pendulum-v1.
         gravity: m/s², for the pendulum; None takes the agent's recorded gravity, else the better
             one of 10 and 1, and the summary says so.
         discount: γ that the agent learned with; None takes the recorded one, if there is one.
@@ -67,22 +73,18 @@ def evaluate_policy(
     >>> score.returns.shape, score.regret < 5
     ((10,), True)
     """
-    policy = as_policy(agent, torques)
+    policy = as_policy(agent, torques, environment=environment)
     episodes = Integer(1, 1_000_000).validate("episodes", episodes)
     seed = Integer(0, 2**32 - episodes).validate("seed", seed)
     task, assumption = find_task(policy, gravity)
     if discount is None:
         discount = policy.info.discount
-    elif not task.has_exact_values:
-        raise ConfigError(
-            f"discount belongs to Pendulum-v1; {task.environment} has no exact solution"
-        )
     else:
         discount = Number(0, 1).validate("discount", discount)
     seeds = range(seed, seed + episodes)
-    returns = _play(policy, task, seeds, render_mode, on_step, on_progress)
+    returns, ends = _play(policy, task, seeds, render_mode, on_step, on_progress)
     best = solution(task).best_returns(seeds)
-    return Score(task, returns, best, discount, seeds, assumption)
+    return Score(task, returns, best, discount, seeds, assumption, ends)
 
 
 def find_task(policy: Policy, gravity: float | None) -> tuple[Task, str]:
@@ -104,7 +106,8 @@ def find_task(policy: Policy, gravity: float | None) -> tuple[Task, str]:
     for task in map(Pendulum, USUAL_GRAVITIES):
         exact = solution(task)
         random, best = exact.random_return(), float(exact.best_returns(seeds).mean())
-        gained[task] = (float(_play(policy, task, seeds).mean()) - random) / (best - random)
+        returns, _ = _play(policy, task, seeds)
+        gained[task] = (float(returns.mean()) - random) / (best - random)
     first, second = sorted(gained, key=lambda task: gained[task], reverse=True)
     return first, (
         f"The agent records no gravity. It gains {gained[first]:.0%} of what can be gained over "
@@ -120,10 +123,13 @@ def _play(
     render_mode: str | None = None,
     on_step: OnStep | None = None,
     on_progress: Report = lambda share: None,
-) -> NDArray[np.float64]:
-    """Returns the undiscounted returns of the episodes from these seeds."""
+) -> tuple[NDArray[np.float64], list[Path]]:
+    """Returns the undiscounted returns of the episodes from these seeds, and their paths.
+
+    A path has the last observations [T, D] of an episode that terminated, and none of another.
+    """
     # One episode after the other where it is watched, or the policy needs it. Otherwise the policy
-    # gets the observations of many episodes of the same length in one call.
+    # gets the observations of many episodes in one call.
     episodes = len(seeds)
     alone = policy.one_by_one or render_mode is not None or on_step is not None
     count = 1 if alone else min(_SIDE_BY_SIDE, episodes)
@@ -131,54 +137,87 @@ def _play(
     def report(first: int, step: int) -> None:
         on_progress((first + count * step / task.steps_per_episode) / episodes)
 
+    returns, paths = [], []
     with contextlib.ExitStack() as stack:
         envs = [
             stack.enter_context(contextlib.closing(task.make_env(render_mode)))
             for _ in range(count)
         ]
-        return np.concatenate(
-            [
-                _returns(policy, envs, seeds[first : first + count], first, on_step, report)
-                for first in range(0, episodes, count)
+        for first in range(0, episodes, count):
+            played = [
+                _Episode(env, seed, first + number)
+                for number, (env, seed) in enumerate(
+                    zip(envs, seeds[first : first + count], strict=False)
+                )
             ]
-        )
+            _play_together(policy, played, on_step, report)
+            returns += [episode.total for episode in played]
+            paths += [episode.path for episode in played]
+    return np.array(returns), paths
 
 
-def _returns(
+class _Episode:
+    """An episode that is played.
+
+    Args:
+        env: its environment.
+        seed: of its reset.
+        number: of the episode, from 0.
+    """
+
+    def __init__(self, env: Env, seed: int, number: int) -> None:
+        self.env = env
+        self.number = number
+        self.observation, _ = env.reset(seed=seed)
+        self.total = 0.0
+        self.is_over = False
+        self._terminated = False
+        self._last: deque[NDArray[np.float32]] = deque(maxlen=_PATH_STEPS)
+
+    def step(self, action: Any) -> None:
+        """Takes a step."""
+        self._last.append(self.observation)
+        self.observation, reward, self._terminated, truncated, _ = self.env.step(action)
+        self.total += float(reward)
+        self.is_over = self._terminated or truncated
+
+    @property
+    def path(self) -> Path:
+        """The last observations [T, D] before it terminated; [0, D] where it did not."""
+        kept = self._terminated and self.number < _PATHS
+        return np.array(self._last if kept else [], np.float32).reshape(-1, len(self.observation))
+
+
+def _play_together(
     policy: Policy,
-    envs: Sequence[Env],
-    seeds: range,
-    first: int,
+    episodes: Sequence[_Episode],
     on_step: OnStep | None,
     report: Callable[[int, int], None],
-) -> NDArray[np.float64]:
-    """Returns the undiscounted return of an episode for each seed, in environments of their own.
+) -> None:
+    """Plays episodes to their ends, in environments of their own.
 
-    `report` is called with `first` and the step.
+    `report` is called with the number of the first episode and the step.
 
-    Raises UserError for an answer that is not an action, with its step and the number of its
-    episode, which is `first` for the first seed.
+    Raises UserError for an answer that is not an action, with its episode and step.
     """
-    envs = envs[: len(seeds)]
-    observations = [env.reset(seed=seed)[0] for env, seed in zip(envs, seeds, strict=True)]
     policy.reset()
     if on_step:
-        on_step(envs[0])
-    returns = np.zeros(len(envs))
+        on_step(episodes[0].env)
+    playing = list(episodes)
     for step in itertools.count():
         try:
-            if len(envs) == 1:
-                actions: Any = [policy.action(observations[0])]
+            if len(episodes) == 1:
+                actions: Any = [policy.action(playing[0].observation)]
             else:
-                actions = policy.act(np.stack(observations))  # [B, ...]
+                actions = policy.act(np.stack([each.observation for each in playing]))  # [B, ...]
         except ActionError as error:
-            raise UserError(f"episode {first + error.row}, step {step}: {error}") from error
-        for row, env in enumerate(envs):
-            observations[row], reward, terminated, truncated, _ = env.step(actions[row])
-            returns[row] += float(reward)
+            number = playing[error.row].number
+            raise UserError(f"episode {number}, step {step}: {error}") from error
+        for episode, action in zip(playing, actions, strict=True):
+            episode.step(action)
             if on_step:
-                on_step(env)
-        report(first, step)
-        if terminated or truncated:
-            break
-    return returns
+                on_step(episode.env)
+        report(episodes[0].number, step)
+        playing = [episode for episode in playing if not episode.is_over]
+        if not playing:
+            return

@@ -23,22 +23,26 @@ _CODE = re.compile(r"(?P<place>.+\.py|\w+(\.\w+)*):(?P<name>[^\W\d]\w*)", re.DOT
 
 
 def named_policy(
-    word: str, torques: ArrayLike | None = None, activation: str | None = None
+    word: str,
+    torques: ArrayLike | None = None,
+    activation: str | None = None,
+    environment: str | None = None,
 ) -> Policy:
     """Returns the policy that a word of the command line names.
 
     The word is a file, the name of a shipped one, `file.py:name` or `package.module:name`. The last
-    two run the user's code. See `as_policy` for the torques and `load_weights` for the activation.
+    two run the user's code. See `as_policy` for the torques and the environment, and
+    `load_weights` for the activation.
 
     Raises UserError for a word that names no agent, and when the user's code fails.
     """
     if not names_code(word):
         path = os.fspath(find_weights(word))
-        return as_policy(load_keras_file(path, activation), torques, path)
+        return as_policy(load_keras_file(path, activation), torques, path, environment)
     if activation is not None:
         raise UserError("--activation belongs to a weights file; your code has its own")
     try:
-        policy = as_policy(_load_code(word), torques)
+        policy = as_policy(_load_code(word), torques, environment=environment)
     except TypeError as error:
         raise UserError(f"{word}: {error}") from error
     policy.name = word

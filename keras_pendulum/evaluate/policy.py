@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from keras_pendulum.environments.actions import Actions
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.tasks import declared_task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.storage.run_info import RunInfo
 
@@ -63,6 +64,25 @@ class Policy(ABC):
         Raises ValueError as a call does, and TypeError for a policy without Q-values.
         """
         raise TypeError(f"{self.name} has no Q-values")
+
+    def with_environment(self, environment: str) -> Policy:
+        """Returns the policy as one of an environment, such as `CartPole-v1`.
+
+        Raises ConfigError for an unknown environment, and where it is one of another.
+        """
+        task = declared_task(environment)
+        recorded = self.info.task
+        if recorded is None and task.environment != self.task.environment:
+            return self._of_task(task)
+        if self.task.environment != environment:
+            raise ConfigError(
+                f"{self.name} is an agent of {self.task.environment}, not of {environment}"
+            )
+        return self
+
+    def _of_task(self, task: Task) -> Policy:
+        """Returns the policy, which records no task, as one of another task."""
+        raise ConfigError(f"{self.name} is an agent of {self.task.environment}")
 
     def with_torques(self, torques: ArrayLike) -> Policy:
         """Returns the policy with other torques (N·m) for its outputs.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,23 @@ from numpy.typing import ArrayLike, NDArray
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.dqn.policy import GreedyPolicy
 from keras_pendulum.environments.actions import Actions, TorqueActions, torque_actions
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError, require_finite
-from keras_pendulum.evaluate.answers import best_of, call_agent, is_instance, name_of, q_values_of
+from keras_pendulum.evaluate.answers import (
+    ActionError,
+    best_of,
+    call_agent,
+    is_instance,
+    name_of,
+    q_values_of,
+)
 from keras_pendulum.evaluate.policy import Observations, Policy
 from keras_pendulum.storage.run_info import RunInfo
 
 # Two states to try an agent with, one with each sign.
 _EXAMPLES = np.array([[1, 0, 0.5], [-0.6, -0.8, -3]], np.float32)  # [2, 3]
+_CARTPOLE_EXAMPLES = np.array([[1, 0.5, 0.1, 0.2], [-1, -0.5, -0.1, -2]], np.float32)  # [2, 4]
 
 
 class DQNPolicy(Policy):
@@ -33,6 +44,7 @@ class DQNPolicy(Policy):
 
     has_q_values = True
     one_by_one = True
+    actions: Actions
 
     def __init__(self, network: DQN, name: str | None = None) -> None:
         self.weights = network.get_weights()  # copies
@@ -40,7 +52,7 @@ class DQNPolicy(Policy):
         require_finite(self.weights)
         info = RunInfo.from_record(network.metadata)
         super().__init__(name or info.preset or "DQN", info)
-        self.actions: Actions = self.task.actions(network.action_count)
+        self.actions = self.task.actions(network.action_count)
         self._greedy = GreedyPolicy(self.weights, self.activation)
 
     def with_torques(self, torques: ArrayLike) -> DQNPolicy:
@@ -50,6 +62,12 @@ class DQNPolicy(Policy):
         changed = copy.copy(self)
         changed.actions = torque_actions(torques, self.actions.count)
         return changed
+
+    def _of_task(self, task: Task) -> Policy:
+        raise ConfigError(
+            f"{self.name} takes {self.task.observation_size} numbers; {task.environment} has "
+            f"{task.observation_size}"
+        )
 
     def q_values(self, observations: ArrayLike) -> NDArray[np.float32]:
         """Returns the Q-value of each action: [B, A], or [A] for one observation."""
@@ -66,21 +84,46 @@ class DQNPolicy(Policy):
 
 
 class QPolicy(Policy):
-    """The greedy policy of a function from observations [B, 3] to Q-values [B, A].
+    """The greedy policy of a function from observations [B, D] to Q-values [B, A].
 
-    Its arguments and errors are those of `q_function`.
+    It is one of the pendulum where it answers to three numbers, else one of CartPole. Its arguments
+    and errors are those of `q_function`.
     """
 
     has_q_values = True
+    actions: Actions
 
     def __init__(
         self, function: Callable[[Any], Any], torques: ArrayLike | None, name: str
     ) -> None:
-        count = q_values_of(call_agent(function, _EXAMPLES), len(_EXAMPLES)).shape[1]
         super().__init__(name)
-        self.actions: Actions = torque_actions(torques, count)
         self._declared = torques is not None
         self._function = function
+        try:
+            values = q_values_of(call_agent(function, _EXAMPLES), len(_EXAMPLES))
+        except ActionError as error:
+            if self._declared:
+                raise
+            try:
+                values = q_values_of(
+                    call_agent(function, _CARTPOLE_EXAMPLES), len(_CARTPOLE_EXAMPLES)
+                )
+            except ActionError:
+                raise error from None
+            q_values_of(values, len(_CARTPOLE_EXAMPLES), 2)
+            self.info, self.actions = RunInfo(CartPole()), CartPole().actions()
+        else:
+            self.actions = torque_actions(torques, values.shape[1])
+
+    def _of_task(self, task: Task) -> QPolicy:
+        """Returns the policy as one of CartPole. Raises ActionError where it has other values."""
+        if self._declared:
+            raise ConfigError(f"{self.name} has torques, which belong to {self.task.environment}")
+        answer = call_agent(self._function, _CARTPOLE_EXAMPLES)
+        q_values_of(answer, len(_CARTPOLE_EXAMPLES), task.actions().count)
+        changed = copy.copy(self)
+        changed.info, changed.actions = replace(self.info, task=task), task.actions()
+        return changed
 
     def with_torques(self, torques: ArrayLike) -> QPolicy:
         """Returns the policy with other torques (N·m) for its outputs.
@@ -89,12 +132,14 @@ class QPolicy(Policy):
         """
         if self._declared:
             raise ConfigError(f"torques are given twice: {self.name} has torques of its own")
+        if not isinstance(self.actions, TorqueActions):
+            raise ConfigError(f"torques belong to Pendulum-v1; {self.task.environment} has none")
         changed = copy.copy(self)
         changed.actions = torque_actions(torques, self.actions.count)
         return changed
 
     def q_values(self, observations: ArrayLike) -> NDArray[Any]:
-        """Returns the Q-values [B, A] of observations [B, 3].
+        """Returns the Q-values [B, A] of observations [B, D].
 
         Raises ActionError when the function raises an exception or returns anything else.
         """
@@ -113,8 +158,9 @@ def q_function(
 
     Args:
         function: gets observations, float32 [B, 3], as a NumPy array, and returns Q-values [B, A]
-            as an array of NumPy, PyTorch, TensorFlow or JAX. A `torch.nn.Module` gets a tensor on
-            its own device, in its evaluation mode and without gradients.
+            as an array of NumPy, PyTorch, TensorFlow or JAX. One of CartPole gets [B, 4]. A
+            `torch.nn.Module` gets a tensor on its own device, in its evaluation mode and without
+            gradients.
         torques: N·m, one for each output, -2 to 2; None takes `linspace(-2, 2, A)`.
         name: for messages; None takes the function's.
 

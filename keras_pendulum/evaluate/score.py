@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.task import Task
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
 from keras_pendulum.optimum.solutions import solution
 
 # What the mean return gains by torques between the 41, with a margin:
 # benchmarks.learning.finer_torques.
 FINER_TORQUE_GAIN = 0.002
+
+
+class Fall(NamedTuple):
+    """The last state of an episode from which the optimum would not have fallen."""
+
+    seed: int  #: of the episode's start
+    steps_before: int  #: from this state to the end of the episode
+    observation: list[float]  #: [D]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +42,7 @@ class Score:
     discount: float | None = None  #: γ that the policy learned with, where it is known
     seeds: range | None = None  #: the seeds of the starts
     assumption: str = ""  #: says which task was assumed, for an agent that records none
+    paths: Sequence[NDArray[np.float32]] = ()  #: last observations [T, D] of terminated episodes
 
     @property
     def environment(self) -> str:
@@ -77,8 +88,8 @@ class Score:
     def discount_regret(self) -> float | None:
         """The part of the regret that the discount alone costs, by the exact policy for γ.
 
-        It is None for an unknown discount and for CartPole. For another γ and gravity than those
-        of the presets, its first use takes about 10 s.
+        It is None for an unknown discount. For another γ and gravity than those of the presets, its
+        first use takes about 10 s.
         """
         if self.seeds is None:
             return None
@@ -89,6 +100,30 @@ class Score:
         """The regret from learning; negative where the policy beats the exact one for γ."""
         cost = self.discount_regret
         return None if cost is None else self.regret - cost
+
+    @property
+    def fallen(self) -> int:
+        """The number of episodes that terminated early; 0 for the pendulum."""
+        return 0 if self.task.never_terminates else int((self.returns < self.optimal_returns).sum())
+
+    @cached_property
+    def falls(self) -> list[Fall]:
+        """The last state before each fall from which the optimum still balances the pole.
+
+        Those of the first 1000 episodes. An episode whose last 100 states are all lost has none.
+        """
+        exact, found = solution(self.task), []
+        if not isinstance(exact, KnownDynamics):
+            return []
+        for number, path in enumerate(self.paths):
+            if not len(path) or self.seeds is None:
+                continue
+            balanced = exact.survives(exact.states_of(path))
+            if balanced.any():
+                last = int(np.flatnonzero(balanced)[-1])
+                state = [float(each) for each in path[last]]
+                found.append(Fall(self.seeds[number], len(path) - last, state))
+        return found
 
     def as_json(self) -> dict[str, Any]:
         """Returns the object that `evaluate --json` prints."""
@@ -106,10 +141,15 @@ class Score:
             "discount_regret": self.discount_regret,
             "learning_regret": self.learning_regret,
             **({"assumption": self.assumption} if self.assumption else {}),
+            **({"fallen": self.fallen} if self.fallen else {}),
+            **({"falls": [fall._asdict() for fall in self.falls]} if self.falls else {}),
         }
 
     def summary(self) -> str:
-        """Returns the lines that `evaluate` prints: three, and one more for a known discount."""
+        """Returns the lines that `evaluate` prints.
+
+        There are three, one more for a known discount, and one more for a pole that fell.
+        """
         regret = f"{self.regret:.2f}"
         if self.regret < 0:
             regret = f"0.00 (the mean return is {-self.regret:.4f} above the best known one: "
@@ -136,4 +176,19 @@ class Score:
             lines.append(
                 f"Exact policy for the discount {self.discount:g}: regret {cost:.2f}. {part}"
             )
+        if self.fallen:
+            lines.append(self._falls_line())
         return "\n".join(lines)
+
+    def _falls_line(self) -> str:
+        line = f"The pole fell in {self.fallen} of {len(self.returns)} episodes"
+        if not self.falls:
+            return line
+        before = np.array([fall.steps_before for fall in self.falls])
+        seed, _, state = self.falls[0]
+        names = zip(self.task.observation_names, state, strict=True)
+        shown = ", ".join(f"{name} = {value:.2f}" for name, value in names)
+        return (
+            f"{line}. The optimum would still balance it {np.median(before):.0f} steps before the "
+            f"end (median of {len(before)}): with seed {seed}, at {shown}"
+        )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import keras
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UnknownLayersError, UserError, one_line
 from keras_pendulum.evaluate.answers import is_instance
 from keras_pendulum.evaluate.policy import Policy
@@ -45,24 +44,37 @@ def load_policy(source: DQN | str | os.PathLike[str], activation: str | None = N
     return DQNPolicy(source if isinstance(source, DQN) else load_weights(source, activation))
 
 
-def as_policy(source: Any, torques: ArrayLike | None = None, name: str | None = None) -> Policy:
+def as_policy(
+    source: Any,
+    torques: ArrayLike | None = None,
+    name: str | None = None,
+    environment: str | None = None,
+) -> Policy:
     """Returns the policy that an object stands for.
 
     Args:
         source: a `DQN`, or the path or shipped name of its file; a Keras model from observations
-            [B, 3] to Q-values [B, A], or its `.keras` file; a `q_function`; a function from an
-            observation [3] to a torque in N·m; an object with Stable-Baselines3's `predict`, or
-            with such a function as its `act`, `choose_action`, `select_action` or `get_action`; a
-            Policy.
+            [B, D] to Q-values [B, A], or its `.keras` file; a `q_function`; a function from an
+            observation [D] to a torque in N·m, or to an action of CartPole; an object with
+            Stable-Baselines3's `predict`, or with such a function as its `act`, `choose_action`,
+            `select_action` or `get_action`; a Policy.
         torques: N·m, what the outputs or indices stand for, -2 to 2; None takes
             `linspace(-2, 2, A)`.
         name: of the policy; None takes that of the source.
+        environment: Gymnasium's name; None takes the recorded one, else CartPole-v1 for an agent
+            that takes four numbers, else Pendulum-v1.
 
-    Raises TypeError for another object, ConfigError for wrong torques, WeightsError for a wrong
-    file, and UserError for a Keras model without weights or with other outputs.
+    Raises TypeError for another object, ConfigError for wrong torques or another environment,
+    WeightsError for a wrong file, and UserError for a Keras model without weights or with other
+    outputs.
     """
+    policy = _policy_of(source, torques, name)
+    return policy if environment is None else policy.with_environment(environment)
+
+
+def _policy_of(source: Any, torques: ArrayLike | None, name: str | None) -> Policy:
     if isinstance(source, (str, os.PathLike)):
-        return as_policy(load_keras_file(source), torques, os.fspath(source))
+        return _policy_of(load_keras_file(source), torques, os.fspath(source))
     if isinstance(source, DQN):
         source = DQNPolicy(source, name)
     if isinstance(source, Policy):
@@ -71,11 +83,12 @@ def as_policy(source: Any, torques: ArrayLike | None = None, name: str | None = 
         if not source.built:
             raise UserError("the Keras model has no weights yet: build it or load them first")
         shape = getattr(source, "input_shape", None)
-        size = len(Pendulum.observation_names)
-        if isinstance(shape, tuple) and shape[-1] not in (None, size):
+        sizes = {len(task.observation_names): name for name, task in TASKS.items()}
+        if isinstance(shape, tuple) and shape[-1] not in (None, *sizes):
+            needed = " and ".join(f"{size} of {task}" for size, task in sizes.items())
             raise UserError(
-                f"the Keras model takes inputs of the shape {shape}; an observation of "
-                f"{Pendulum.environment} has {size} numbers"
+                f"the Keras model takes inputs of the shape {shape}; an observation has the "
+                f"numbers {needed}"
             )
         call = partial(source, training=False)
         if isinstance(shape, tuple) and len(shape) == 3 and shape[1] == 1:  # such as keras-rl's
@@ -101,15 +114,12 @@ def load_keras_file(
     """Returns the network in a file.
 
     A chain of Dense layers is read by `load_weights`, with the same arguments and errors. A whole
-    model with other layers, in a `.keras` file, is read by `load_keras_model`, which raises
-    WeightsError for layers that Keras cannot load safely.
+    model with other layers is read by `load_keras_model`, which raises WeightsError for layers that
+    Keras cannot load safely.
     """
     try:
         return load_weights(path, activation)
-    except UnknownLayersError as unknown:
-        file = find_weights(path)
-        if Path(file).suffix.lower() != ".keras":
-            raise UnknownLayersError(f"{unknown}; save other models as .keras") from unknown
+    except UnknownLayersError:
         from keras_pendulum.storage.keras_models import load_keras_model
 
-        return load_keras_model(file)
+        return load_keras_model(find_weights(path))

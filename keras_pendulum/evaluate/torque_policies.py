@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum.environments.actions import torque_actions
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.answers import (
@@ -26,9 +30,10 @@ from keras_pendulum.storage.run_info import RunInfo
 
 
 class FunctionPolicy(Policy):
-    """A function from one observation [3] to a torque in N·m, or to the index of one.
+    """A function from one observation [D] to a torque in N·m, or to the index of an action.
 
-    It may have a state. With `torques`, its answers are indices of them.
+    It may have a state. With `torques`, its answers are indices of them. Those of CartPole are
+    indices, too.
     """
 
     one_by_one = True
@@ -42,29 +47,40 @@ class FunctionPolicy(Policy):
         if torques is not None:
             self.actions = torque_actions(torques)
 
-    def act(self, observations: Observations) -> NDArray[np.float64]:
-        """Returns the torques [B, 1]. Raises ActionError for an answer that is not a torque."""
+    def act(self, observations: Observations) -> NDArray[Any]:
+        """Returns the actions for observations [B, D], as the environment takes them.
+
+        Raises ActionError for an answer that is not an action.
+        """
         if not self.one_by_one:
-            return self._torques(observations)[:, np.newaxis]
-        torques = np.empty((len(observations), 1))
+            return self._actions(observations)
+        actions = []
         for row, observation in enumerate(observations):
             try:
-                torques[row] = self._torques(observation)
+                actions.append(self._actions(observation))
             except ActionError as error:
                 error.row = row
                 raise
-        return torques
+        return np.stack(actions)
 
-    def _torques(self, observations: Observations) -> NDArray[np.float64]:
-        """Returns the torques in N·m: [B] for observations [B, 3], [] for [3]."""
+    def _of_task(self, task: Task) -> FunctionPolicy:
+        """Returns the policy as one of CartPole."""
+        if self.actions is not None:
+            raise ConfigError(f"{self.name} has torques, which belong to {self.task.environment}")
+        changed = copy.copy(self)
+        changed.info, changed.actions = replace(self.info, task=task), task.actions()
+        return changed
+
+    def _actions(self, observations: Observations) -> NDArray[Any]:
+        """Returns the actions for observations [B, D], or that for one, [D]."""
         return self._read(call_agent(self._source, observations), observations.shape[:-1])
 
-    def _read(self, answer: Any, batch: Batch) -> NDArray[np.float64]:
-        """Returns the torques in N·m that an answer stands for."""
+    def _read(self, answer: Any, batch: Batch) -> NDArray[Any]:
+        """Returns the actions that an answer stands for."""
         if self.actions is None:
-            return torques_of(answer, batch)
+            return torques_of(answer, batch)[..., np.newaxis]
         indices = indices_of(answer, batch, self.actions.count, self._first)
-        return np.asarray(self.actions.values[indices, 0])
+        return np.asarray(self.actions.values[indices])
 
 
 class PredictPolicy(FunctionPolicy):
@@ -77,7 +93,8 @@ class PredictPolicy(FunctionPolicy):
         source: the object.
         torques: N·m, what the indices stand for; None takes `linspace(-2, 2, A)`.
 
-    Raises ConfigError when its spaces are not those of the pendulum.
+    One that takes four numbers and has two actions is one of CartPole. Raises ConfigError when its
+    spaces are not those of a task.
     """
 
     def __init__(self, source: Any, torques: ArrayLike | None) -> None:
@@ -85,11 +102,15 @@ class PredictPolicy(FunctionPolicy):
         info = RunInfo(settings={} if gamma is None else {"discount": gamma})
         super().__init__(source, info=info)
         shape = getattr(getattr(source, "observation_space", None), "shape", (3,))
-        if shape is None or tuple(shape) != (3,):
-            raise ConfigError(f"{self.name} takes observations of the shape {shape}; expected (3,)")
         space: Any = getattr(source, "action_space", None)
         bounds: Any = [getattr(space, "low", None), getattr(space, "high", None)]
-        if hasattr(space, "n"):
+        cartpole = shape == (4,) and torques is None and getattr(space, "n", 0) == 2
+        if not cartpole and (shape is None or tuple(shape) != (3,)):
+            raise ConfigError(f"{self.name} takes observations of the shape {shape}; expected (3,)")
+        if cartpole:
+            self.info = replace(info, task=CartPole())
+            self.actions = CartPole().actions()
+        elif hasattr(space, "n"):
             self.actions = torque_actions(torques, int(space.n))
         elif space is None and torques is not None:
             self.actions = torque_actions(torques)
@@ -107,7 +128,7 @@ class PredictPolicy(FunctionPolicy):
         if self.has_q_values:
             self.q_values = q_function(network, torques).q_values  # type: ignore[method-assign]
 
-    def _torques(self, observations: Observations) -> NDArray[np.float64]:
+    def _actions(self, observations: Observations) -> NDArray[Any]:
         answer = call_agent(self._source.predict, observations, deterministic=True)
         if not isinstance(answer, tuple) or not answer:
             raise ActionError(

@@ -51,7 +51,7 @@ def step_all_torques(
         gravity: g in m/s².
         theta: [N] rad, any angle.
         speed: [N] rad/s, -8 to 8.
-        torques: [A] N·m, -2 to 2.
+        torques: N·m, -2 to 2, [A] or [N, A].
     """
     # The order of the operations is Gymnasium's, so the floating-point rounding is the same.
     gravity_term = 3 * gravity / 2 * np.sin(theta)  # [N] rad/s²

@@ -4,23 +4,87 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum, pendulum_starts
-from keras_pendulum.optimum.optimal_return import discounted_return, optimal_return
-from keras_pendulum.optimum.solution import RANDOM_EPISODES, Solution
+from keras_pendulum.environments.pendulum import (
+    MAX_SPEED,
+    STEPS_PER_EPISODE,
+    Pendulum,
+    pendulum_starts,
+)
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.optimum.discounted import discounted_value, exact_q
+from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
+from keras_pendulum.optimum.known_dynamics import KnownDynamics, Outcomes, Table
+from keras_pendulum.optimum.pendulum_returns import discounted_return
+from keras_pendulum.optimum.solution import RANDOM_EPISODES, Array
 
 
-class PendulumSolution(Solution):
-    """The solution at the gravity of the task. New ones are computed, which takes about 20 s."""
+class PendulumSolution(KnownDynamics):
+    """The solution at the gravity of the task. New ones are computed, which takes about 20 s.
+
+    A state is θ in rad and θ̇ in rad/s, S = 2.
+    """
 
     task: Pendulum
+    effort: ClassVar[str] = "torque"
+    unit: ClassVar[str] = "N·m"
+    largest_effort: ClassVar[float] = MAX_TORQUE
+    any_effort: ClassVar[bool] = True
+    observation_sizes: ClassVar[tuple[float, ...]] = (1.0, 1.0, MAX_SPEED)
+    mirror: ClassVar[tuple[int, ...]] = (1, -1, -1)
+    other_units: ClassVar[dict[str, tuple[float, ...]]] = {
+        "cos θ, sin θ, θ̇·π/180": (1, 1, math.pi / 180),
+        "cos θ, sin θ, θ̇·180/π": (1, 1, 180 / math.pi),
+        "cos θ, sin θ, θ̇/8": (1, 1, 1 / MAX_SPEED),
+    }
+    least_random: ClassVar[float] = 0.1
+
+    def starts(self, seeds: Iterable[int]) -> Array:
+        """Returns the states [seeds, 2]."""
+        return pendulum_starts(seeds)
+
+    def observe(self, states: Array) -> NDArray[np.float32]:
+        """Returns the observations [N, 3] of states [N, 2]."""
+        theta, speed = states.T
+        return np.stack([np.cos(theta), np.sin(theta), speed], axis=1).astype(np.float32)
+
+    def states_of(self, observations: NDArray[Any]) -> Array:
+        """Returns the states [N, 2] of observations [N, 3]."""
+        cosine, sine, speed = observations.astype(np.float64).T
+        return np.stack([np.arctan2(sine, cosine), speed], axis=1)
+
+    def efforts(self, actions: NDArray[Any]) -> Array:
+        """Returns the torques [N] in N·m of actions [N, 1]."""
+        return np.asarray(actions[:, 0], np.float64)
+
+    def outcomes(self, states: Array, efforts: Array) -> Outcomes:
+        """Returns the outcomes of one step, for torques [A] or [N, A] in N·m."""
+        reward, theta, speed = step_all_torques(
+            self.task.gravity, states[:, 0], states[:, 1], efforts
+        )
+        return Outcomes(reward, np.stack([theta, speed], axis=2), np.zeros(reward.shape, bool))
+
+    def table(self, discount: float) -> Table:
+        """Returns that of `discounted_value`."""
+        return discounted_value(self.task.gravity, discount)
+
+    def exact_q(self, table: Table, discount: float, states: Array, efforts: Array) -> Array:
+        """Returns the Q-values [N, A]."""
+        theta, speed = states.T
+        return exact_q(table, self.task.gravity, discount, theta, speed, efforts)
+
+    def greedy_efforts(self, table: Table, discount: float, states: Array) -> Array:
+        """Returns the torques [N] in N·m, of the 41."""
+        q = self.exact_q(table, discount, states, TORQUES)
+        return np.asarray(TORQUES[q.argmax(axis=1)])
 
     def best_returns(self, seeds: Iterable[int], steps: int | None = None) -> NDArray[np.float64]:
-        """Returns those of `optimal_return`."""
-        return optimal_return(self.task.gravity, seeds, steps or STEPS_PER_EPISODE)
+        """Returns those for γ = 1."""
+        return self.discounted_returns(1.0, seeds, steps)
 
     def mean_best_return(self, steps: int) -> float:
         """Returns the mean over the seeds 0 to 999; NaN for longer episodes than Gymnasium's."""
@@ -37,11 +101,12 @@ class PendulumSolution(Solution):
         self, discount: float, seeds: Iterable[int], steps: int | None = None
     ) -> NDArray[np.float64]:
         """Returns those of `discounted_return`."""
-        return discounted_return(self.task.gravity, discount, seeds, steps or STEPS_PER_EPISODE)
+        steps = STEPS_PER_EPISODE if steps is None else steps
+        return discounted_return(self.task.gravity, discount, seeds, steps)
 
     def random_return(self, steps: int | None = None) -> float:
         """Returns the mean return of uniformly random torques."""
-        from keras_pendulum.optimum.dynamics import TORQUES, simulate_return
+        from keras_pendulum.optimum.dynamics import simulate_return
 
         # Simulating all episodes in one array is 20 times as fast as a loop.
         steps = steps or STEPS_PER_EPISODE

@@ -15,6 +15,8 @@ from keras_pendulum.environments.task import Task
 USUAL_SEEDS = range(1000)  # computed together, because most of the time goes into V
 RANDOM_EPISODES = 100
 
+Array = NDArray[np.float64]
+
 
 class Solution(ABC):
     """The solution of a task. A further task has a subclass in a module of its own.

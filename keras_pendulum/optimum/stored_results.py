@@ -70,23 +70,34 @@ def read(path: Path | None, problem: Problem, *names: str) -> list[NDArray[Any]]
 
     The result is empty when the file is missing, damaged, or of another problem.
     """
-    if path is None:
+    # A file of 200 steps or of discount 1 may leave them out.
+    found: dict[str, Any] = {"steps": STEPS_PER_EPISODE, "discount": 1.0, **read_arrays(path)}
+    if not found.keys() >= {*Problem._fields, *names}:
         return []
+    own = all(np.array_equal(found[key], value) for key, value in problem._asdict().items())
+    return [found[name] for name in names] if own else []
+
+
+def read_arrays(path: Path | None) -> dict[str, NDArray[Any]]:
+    """Returns the arrays of a file by name; none when it is missing or damaged."""
+    if path is None:
+        return {}
     try:
         with np.load(path, allow_pickle=False) as file:
-            # A file of 200 steps or of discount 1 may leave them out.
-            found = {"steps": STEPS_PER_EPISODE, "discount": 1.0, **file}
-            own = all(np.array_equal(found[key], value) for key, value in problem._asdict().items())
-            return [found[name] for name in names] if own else []
+            return dict(file)
     except Exception:  # one flipped bit of an archive can raise any of seven exception types
-        return []
+        return {}
 
 
 def write(path: Path, problem: Problem, **arrays: NDArray[Any]) -> None:
     """Writes a file that `read` reads. Raises UserError when it cannot be written."""
+    write_arrays(path, {**problem._asdict(), **arrays})
+
+
+def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
+    """Writes a file that `read_arrays` reads. Raises UserError when it cannot be written."""
     buffer = io.BytesIO()
-    members: dict[str, Any] = {**problem._asdict(), **arrays}
-    np.savez_compressed(buffer, **members)
+    np.savez_compressed(buffer, **arrays)
     write_atomically(path, buffer.getvalue())
 
 
@@ -100,8 +111,13 @@ def cache_file(name: str) -> Path | None:
 
 
 def write_to_cache(path: Path | None, problem: Problem, **arrays: NDArray[Any]) -> None:
-    """Writes a file of the cache, if it can be written: it only saves time."""
+    """Writes a file of the cache for `read`, if it can be written: it only saves time."""
+    write_arrays_to_cache(path, {**problem._asdict(), **arrays})
+
+
+def write_arrays_to_cache(path: Path | None, arrays: dict[str, Any]) -> None:
+    """Writes a file of the cache for `read_arrays`, if it can be written."""
     if path is not None:
         with contextlib.suppress(OSError, UserError):
             path.parent.mkdir(parents=True, exist_ok=True)
-            write(path, problem, **arrays)
+            write_arrays(path, arrays)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import WeightsError, did_you_mean
+from keras_pendulum.storage.foreign_files import refuse_foreign
 from keras_pendulum.storage.shipped_weights import shipped_folder, shipped_names
 
 
@@ -15,7 +16,7 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
 
     `name` is the file, a run folder, or the name of a shipped file.
 
-    Raises WeightsError when none of them exists.
+    Raises WeightsError when none of them exists, and for the file of another library.
 
     >>> kp.find_weights("reference").name
     'reference.h5'
@@ -26,6 +27,7 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
     path = Path(name)
     try:
         if path.is_file():
+            refuse_foreign(path)
             return path
         if len(checkpoints := checkpoints_in(path)) == 1:
             return path / checkpoints[0]
@@ -35,6 +37,7 @@ def find_weights(name: str | os.PathLike[str]) -> Path:
     if shipped in shipped_names():
         return shipped_folder() / f"{shipped}.h5"
     if path.is_dir():
+        refuse_foreign(path)
         files = sorted(file.name for file in path.glob("*.h5"))
         example = f", such as {path / files[0]}" if files else ""
         raise WeightsError(

@@ -24,6 +24,7 @@ _LARGEST_LAYER = 8192  # units
 # Kinds of layers without weights that keep the network a chain of Dense layers.
 _WITHOUT_WEIGHTS = {
     *("input", "input_layer", "flatten", "dropout", "activation"),
+    "dense",  # without weights, it was never called
     *("sequential", "functional"),  # models inside the model
 }
 _NOT_LAYERS = {"optimizer", "metrics", "seed_generator"}
@@ -56,10 +57,10 @@ def read_layers(
     # In a whole model, Keras 2 puts the weights into a group.
     root = "model_weights/" if "model_weights" in file else ""
     if "layer_names" in file.attributes.get(root.rstrip("/"), {}):
-        stored = _keras2_layers(file, path, root)
+        stored = _keras2_layers(file, path, root, chain is not None)
         keys = [root + layer.name for layer in chain or ()]
     else:
-        stored = _keras3_layers(file, path)
+        stored = _keras3_layers(file, path, chain is not None)
         keys = [f"layers/dense_{layer.number}".removesuffix("_0") for layer in chain or ()]
     if not stored:
         raise WeightsError(f"{path}: holds no network weights in a layout of Keras 2 or Keras 3")
@@ -124,8 +125,11 @@ def require_sane(array: NDArray[Any], name: str, path: str | os.PathLike[str]) -
         )
 
 
-def _keras2_layers(file: H5File, path: str, root: str) -> list[StoredLayer]:
-    """Returns the layers with weights, in the order that the file records."""
+def _keras2_layers(file: H5File, path: str, root: str, is_chain: bool) -> list[StoredLayer]:
+    """Returns the layers with weights, in the order that the file records.
+
+    `is_chain` says whether the recorded configuration has shown what the others do.
+    """
     names = _texts(file, path, root.rstrip("/"), "layer_names")
     layers = []
     for number, name in enumerate(names):
@@ -133,7 +137,8 @@ def _keras2_layers(file: H5File, path: str, root: str) -> list[StoredLayer]:
         if names.index(name) != number:
             raise WeightsError(f"{path}: has two layers of the name {name}")
         if not weights:
-            _require_no_effect(path, name, name)
+            if not is_chain:
+                _require_no_effect(path, name, name)
             continue
         # The names of a subclassed model begin with its own. Its layers are in the order in which
         # its attributes were assigned.
@@ -143,7 +148,7 @@ def _keras2_layers(file: H5File, path: str, root: str) -> list[StoredLayer]:
     return layers
 
 
-def _keras3_layers(file: H5File, path: str) -> list[StoredLayer]:
+def _keras3_layers(file: H5File, path: str, is_chain: bool) -> list[StoredLayer]:
     """Returns the layers with weights. Their paths name the attributes that hold them."""
     layers = []
     for group, attributes in file.attributes.items():
@@ -160,7 +165,8 @@ def _keras3_layers(file: H5File, path: str) -> list[StoredLayer]:
         # Below `layers` the path names the class of the layer.
         kind = key if containers[-1:] == ["layers"] else name
         if not arrays:
-            _require_no_effect(path, name, kind)
+            if not is_chain:
+                _require_no_effect(path, name, kind)
             continue
         if containers[-1:] == ["layers"] and _split(kind)[0] != "dense":
             raise UnknownLayersError(f"{path}: layer {name} is a {kind}; expected Dense layers")
@@ -188,7 +194,7 @@ def _is_ordered(file: H5File, containers: list[str]) -> bool:
 def _require_no_effect(path: str, name: str, kind: str) -> None:
     """Raises WeightsError for a layer without weights that may change the network."""
     if _split(kind)[0] not in _WITHOUT_WEIGHTS:
-        raise WeightsError(
+        raise UnknownLayersError(
             f"{path}: layer {name} has no weights, and the file does not record what it does; "
             "expected Dense layers"
         )

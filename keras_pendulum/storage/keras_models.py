@@ -1,4 +1,4 @@
-"""Loads whole models with other layers than Dense from `.keras` files, through Keras.
+"""Loads whole models with other layers than Dense from `.keras` and `.h5` files, through Keras.
 
 Keras builds whatever a configuration says: it reads other files, imports packages and allocates
 what it says. So the file is read once, and Keras gets the checked bytes. Its layers are on a list,
@@ -19,31 +19,45 @@ from typing import Any
 import keras
 import tensorflow as tf
 
-from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.errors import UserError, WeightsError
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.errors import UnknownLayersError, UserError, WeightsError
 from keras_pendulum.storage.keras_h5 import require_sane
-from keras_pendulum.storage.known_layers import refuse_model, require_known_layers
+from keras_pendulum.storage.known_layers import modernised, refuse_model, require_known_layers
 from keras_pendulum.storage.model_config import read_model
 from keras_pendulum.storage.quarantine import open_h5
 
 _MEMBERS = {"config.json": 2**20, "metadata.json": 2**16, "model.weights.h5": 2**26}  # bytes
+_HDF5 = b"\x89HDF"
 _RECURRENT = (keras.layers.RNN, keras.layers.Bidirectional, keras.layers.TimeDistributed)
 _MOST_STEPS = 512  # of all recurrent layers together, each step of which takes time
 _LARGEST_OUTPUT = 16_384  # numbers for one observation, of each operation
 
 
 def load_keras_model(path: str | os.PathLike[str]) -> keras.Model:
-    """Returns the model in a `.keras` file.
+    """Returns the model in a `.keras` file, or in an `.h5` file of a whole model.
 
     Raises WeightsError when the file is damaged, when it holds another layer than those of the
     list, or sizes that its weights do not have.
     """
     name = os.fsdecode(path)
     with tempfile.TemporaryDirectory() as folder:
-        weights = Path(folder, "model.weights.h5")  # private: no other program changes the bytes
-        text = _unpack(name, weights)
-        config = read_model(text, name)
+        content, text = _read(name), None
+        if is_h5 := content.startswith(_HDF5):
+            weights = Path(folder, "model.h5")  # Keras asks the ending for the layout
+        else:
+            weights = Path(folder, "model.weights.h5")
+            content, text = _unpack(name, content)
+        weights.write_bytes(content)  # a private file: no other program changes the bytes
         with open_h5(weights, name) as file:
+            recorded = file.attributes[""].get("model_config") if is_h5 else text
+            if recorded is None:
+                raise UnknownLayersError(
+                    f"{name}: holds weights alone, of other layers than Dense: save the whole "
+                    "model (model.save), or load them in mine.py and give mine.py:agent"
+                )
+            config = read_model(recorded, name)
+            if is_h5:
+                config = modernised(config)
             require_known_layers(config, name)
             for array in file:
                 file.read(array)  # which must be finite
@@ -62,20 +76,31 @@ def load_keras_model(path: str | os.PathLike[str]) -> keras.Model:
     return model
 
 
-def _unpack(path: str, weights: Path) -> str:
-    """Writes the HDF5 file in a `.keras` file, a ZIP archive, to `weights`; returns `config.json`.
+def _read(path: str) -> bytes:
+    """Returns the content of a file, read once.
 
-    Raises WeightsError for other members than those of Keras, and for larger ones.
+    Raises WeightsError for a large file, and for one that is neither `.keras` nor HDF5.
     """
     largest = sum(_MEMBERS.values())
     try:
         with open(path, "rb") as file:
-            content = file.read(largest + 1)  # once
-        if not content.startswith(b"PK\x03\x04") or len(content) > largest:
-            raise WeightsError(
-                f"{path}: not a .keras file of at most {largest >> 20} MiB; a model with other "
-                "layers than Dense is loaded from such a file"
-            )
+            content = file.read(largest + 1)
+    except OSError as error:
+        raise WeightsError(f"{path}: cannot be read ({error})") from error
+    if not content.startswith((b"PK\x03\x04", _HDF5)) or len(content) > largest:
+        raise WeightsError(
+            f"{path}: not a .keras or .h5 file of at most {largest >> 20} MiB; a model with other "
+            "layers than Dense is loaded from such a file"
+        )
+    return content
+
+
+def _unpack(path: str, content: bytes) -> tuple[bytes, str]:
+    """Returns the HDF5 file in a `.keras` file, a ZIP archive, and its `config.json`.
+
+    Raises WeightsError for other members than those of Keras, and for larger ones.
+    """
+    try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = [(each.filename, each.file_size) for each in archive.infolist()]
             names = [member for member, _ in members]
@@ -85,8 +110,7 @@ def _unpack(path: str, weights: Path) -> str:
                         f"{path}: holds {member} of {size} bytes; expected {', '.join(_MEMBERS)}, "
                         "once and not larger than usual; for another model, give file.py:name"
                     )
-            weights.write_bytes(archive.read("model.weights.h5"))
-            return archive.read("config.json").decode()
+            return archive.read("model.weights.h5"), archive.read("config.json").decode()
     except UserError:
         raise
     except Exception as error:  # damage causes any error of zipfile
@@ -114,7 +138,11 @@ def _require_sizes(text: str, stored: int, path: str) -> None:
         steps = sum(each.input.shape[1] for each in layers if isinstance(each, _RECURRENT))
         if steps > _MOST_STEPS:
             refuse_model(path, f"its recurrent layers have {steps} steps, more than {_MOST_STEPS}")
-        observation = tf.zeros((1, Pendulum().observation_size))
+        shape = getattr(model, "input_shape", ())
+        sizes = [len(task.observation_names) for task in TASKS.values()]
+        size = next((each for each in sizes if shape[-1:] == (each,)), sizes[0])
+        alone = len(shape) == 3  # [None, 1, 3]
+        observation = tf.zeros((1, 1, size) if alone else (1, size))
         model(observation, training=False)
         computed = {observation.ref()}  # from the observation
         for operation in graph.get_operations():

@@ -33,6 +33,10 @@ _PLACES_OF_LAYERS = {
     *("keras", "keras.layers", "keras.models"),
     *("keras.src.models.functional", "keras.src.models.sequential"),
 }
+_PLACE_OF_MODELS = {
+    "Functional": "keras.src.models.functional",
+    "Sequential": "keras.src.models.sequential",
+}
 # Operations such as Mean, and what layers are made with: none of them runs code or reads files.
 _OPERATIONS = {f"keras.src.ops.{module}" for module in ("numpy", "nn", "math", "linalg")}
 _PARTS = {"keras.initializers", "keras.regularizers", "keras.constraints", "keras.dtype_policies"}
@@ -87,6 +91,34 @@ def require_known_layers(config: dict[str, Any], path: str) -> None:
             refuse_model(path, f"layer {name} has a text of {len(entry)} characters")
     if layers > _MOST_LAYERS:
         refuse_model(path, f"it has {layers} layers and calls, more than {_MOST_LAYERS}")
+
+
+def modernised(config: Any) -> Any:
+    """Returns the configuration of an `.h5` file as `.keras` files have it.
+
+    The former does not name the modules of the layers, and Keras 2 names the shape of an input
+    otherwise. Only classes of the list get a module.
+    """
+    if isinstance(config, list):
+        return [modernised(each) for each in config]
+    if not isinstance(config, dict):
+        return config
+    config = {key: modernised(value) for key, value in config.items()}
+    kind, settings = config.get("class_name"), config.get("config")
+    if kind in _LAYERS and "module" not in config:
+        if kind == "Model":
+            config["class_name"] = kind = "Functional"
+        config |= {"module": _PLACE_OF_MODELS.get(kind, "keras.layers"), "registered_name": None}
+        if kind != "InputLayer" and isinstance(settings, dict):
+            axis = settings.get("axis")
+            if kind == "BatchNormalization" and isinstance(axis, list) and len(axis) == 1:
+                settings["axis"] = axis[0]
+            shape = settings.pop("batch_input_shape", None)
+            if isinstance(shape, list):
+                settings["input_shape"] = shape[1:]
+        if isinstance(settings, list):  # before Keras 2.2.3
+            config["config"] = {"layers": settings}
+    return config
 
 
 def _is_known(entry: dict[str, Any]) -> bool:

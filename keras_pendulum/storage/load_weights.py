@@ -8,12 +8,15 @@ from __future__ import annotations
 import math
 import os
 import warnings
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from keras_pendulum.dqn.network import DQN, REGISTERED_NAME
 from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
+from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError, WeightsError, require_type
@@ -91,6 +94,8 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
             config = model["config"]
             attributes = {name: config[name] for name in config if config[name] is not None}
         info = read_info(attributes, path)
+        if info.task is None and _takes_four(file.shapes.values()):
+            info = replace(info, task=CartPole())
         task = _task(info)
         layers = read_layers(file, path, task.observation_size, model)
     activation = attributes.get("activation")
@@ -139,6 +144,12 @@ def read_info(attributes: dict[str, Any], path: str) -> RunInfo:
         return RunInfo.from_record(attributes)
     except ConfigError as error:
         raise WeightsError(f"{path}: {error}") from error
+
+
+def _takes_four(shapes: Iterable[tuple[int, ...]]) -> bool:
+    """Returns whether a kernel has the inputs of CartPole, and none those of the pendulum."""
+    inputs = {shape[0] for shape in shapes if len(shape) == 2}
+    return CartPole().observation_size in inputs and Pendulum().observation_size not in inputs
 
 
 def _task(info: RunInfo) -> Task:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, NoReturn
 from keras_pendulum.dqn.policy import ACTIVATIONS
 from keras_pendulum.errors import UnknownLayersError, WeightsError
 
-_KINDS = ("InputLayer", "Flatten", "Dense", "Activation", "Dropout")
-_EXPECTED = "expected a chain of Dense layers (with Activation and Dropout layers)"
+_KINDS = ("InputLayer", "Flatten", "Dense", "Activation", "ReLU", "Dropout")
+_EXPECTED = "expected a chain of Dense layers (with Activation, ReLU and Dropout layers)"
 
 
 class DenseLayer(NamedTuple):
@@ -59,11 +59,13 @@ def dense_layers(model: dict[str, Any], path: str) -> list[DenseLayer] | None:
     last_activated = ""
     for layer in layers if kind == "Sequential" else _in_call_order(config, path):
         name, activation = layer["config"]["name"], layer["config"].get("activation")
+        if layer["class_name"] == "ReLU":
+            activation = "relu"
         if activation not in (None, "linear"):
             last_activated = name
         if layer["class_name"] == "Dense":
             chain.append(DenseLayer(name, numbers[name], activation))
-        elif layer["class_name"] == "Activation" and activation != "linear":
+        elif layer["class_name"] in ("Activation", "ReLU") and activation != "linear":
             if not chain or chain[-1].activation != "linear":
                 _refuse(path, name, f"applies {activation} to what is no output of a linear layer")
             chain[-1] = chain[-1]._replace(activation=activation)
@@ -82,7 +84,7 @@ def _check(layer: dict[str, Any], path: str) -> None:
     if registered_name or kind not in _KINDS:
         _refuse(path, name, f"is a {registered_name or kind}")
     shape = config.get("batch_shape", config.get("batch_input_shape"))
-    if shape is not None and len(shape) != 2:
+    if shape is not None and len(shape) != 2 and (len(shape) != 3 or shape[1] != 1):
         _refuse(path, name, f"takes inputs of the shape {shape}")
     dtype = config.get("dtype") or "float32"
     if isinstance(dtype, dict):
@@ -94,6 +96,9 @@ def _check(layer: dict[str, Any], path: str) -> None:
         activation = activation.get("class_name", "a function")
     if activation not in ACTIVATIONS:
         _refuse(path, name, f"has the activation {activation}, not {', '.join(ACTIVATIONS)}")
+    bends = [config.get(each) for each in ("max_value", "negative_slope", "threshold")]
+    if kind == "ReLU" and (bends[0] is not None or any(bends)):
+        _refuse(path, name, "is another function than max(x, 0)")
     if kind == "Dense" and not config["use_bias"]:
         _refuse(path, name, "has no bias")
 

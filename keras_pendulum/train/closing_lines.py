@@ -45,8 +45,10 @@ def result_lines(
         if last.updates == 0:
             lines.append(_why_untrained(config, last, resume))
         elif score.mean_return < random:
-            how = _how_to_repair(config, folder, resume)
-            lines.append(f"The policy is worse than random actions. {how}")
+            lines.append(
+                "The policy is worse than random actions. See why with "
+                f"python -m keras_pendulum.diagnose {shell_word(folder.path)}"
+            )
     return "\n".join(lines)
 
 
@@ -92,13 +94,6 @@ def _why_untrained(config: Config, last: EpisodeRecord, resume: str) -> str:
     )
 
 
-def _how_to_repair(config: Config, folder: RunFolder, resume: str) -> str:
-    """Returns what to do about a policy that is worse than random actions."""
-    if config.task.has_exact_values:
-        return f"See why with python -m keras_pendulum.diagnose {shell_word(folder.path)}"
-    return f"Continue the run with {resume} --episodes {_more_episodes(config)}"
-
-
 def _more_episodes(config: Config) -> int:
     """Returns the number of episodes of the preset, for a run as long as that twice as many."""
     usual = PRESETS[config.preset].episodes if config.preset in PRESETS else 0
@@ -118,7 +113,7 @@ def _next_commands(
         best = shell_word(folder.path / folder.best.name)
         commands["Evaluate the best weights"] = f"evaluate {best}"
     commands["Watch it"] = f"evaluate {weights} --episodes 3 --render"
-    if config.task.has_exact_values:
+    if config.task.has_page:
         commands["Play against it"] = f"play --against {weights}"
         shown = shell_word(folder.path) if folder.snapshots.exists() else weights
         commands["Take it to a browser"] = f"page {shown}"

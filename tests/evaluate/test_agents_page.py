@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+from pathlib import Path
 
 import pytest
 from conftest import ROOT
@@ -13,7 +14,13 @@ EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda text: text.split("\n")[0])
-def test_example_prints_a_regret(example: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_example_prints_a_regret(
+    example: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
     if "stable_baselines3" in example and not importlib.util.find_spec("stable_baselines3"):
         pytest.skip("Stable-Baselines3 is not installed")
     exec(compile(example, "docs/agents.md", "exec"), {})

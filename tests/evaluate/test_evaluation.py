@@ -9,7 +9,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.optimum.optimal_return import discounted_return
+from keras_pendulum.optimum.pendulum_returns import discounted_return
 
 
 def test_returns_equal_those_of_a_plain_loop_on_gymnasium() -> None:
@@ -90,8 +90,12 @@ def test_discount_is_the_given_one_else_the_recorded_one() -> None:
     assert kp.evaluate_policy(kp.DQN((8,)), 1).discount is None
     with pytest.raises(kp.ConfigError, match=r"^discount is 1\.5; expected a number from 0 to 1$"):
         kp.evaluate_policy("reference", 1, discount=1.5)
-    with pytest.raises(kp.ConfigError, match=r"^discount belongs to Pendulum-v1"):
-        kp.evaluate_policy("cartpole", 1, discount=0.9)
+
+
+def test_exact_policy_of_cartpole_for_a_short_sight_falls() -> None:
+    score = kp.evaluate_policy("cartpole", 10, discount=0.5)
+    assert score.discount_regret is not None and 380 < score.discount_regret < 420
+    assert kp.evaluate_policy("cartpole", 10).discount_regret == 0  # γ = 0.99
 
 
 @pytest.mark.parametrize(
@@ -106,7 +110,7 @@ def test_return_above_the_best_one_with_41_torques_is_explained(excess: float, r
     assert line.startswith(f"Regret: 0.00 (the mean return is {reason} ")
 
 
-def test_summary_has_the_same_three_lines_for_both_environments() -> None:
+def test_summary_has_the_same_lines_for_both_environments_and_one_for_a_fall() -> None:
     pendulum = kp.Score(Pendulum(), np.array([-4.0, -2.0]), np.array([-2.5, -1.5]))
     assert pendulum.summary().splitlines() == [
         "Greedy on 2 fixed starts, Pendulum-v1, g = 1: mean return -3.00 "
@@ -120,6 +124,7 @@ def test_summary_has_the_same_three_lines_for_both_environments() -> None:
         "(standard deviation 100.00, median 400.00, worst 300.00)",
         "Best possible on the same starts: 500.00",
         "Regret: 100.00",
+        "The pole fell in 1 of 2 episodes",
     ]
 
 
@@ -180,7 +185,7 @@ def test_gravity_is_the_given_one_else_the_recorded_one(
     recorded: float | None, given: float | None, gravity: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "keras_pendulum.optimum.pendulum.optimal_return", lambda *problem: np.array([problem[0]])
+        "keras_pendulum.optimum.pendulum.discounted_return", lambda *problem: np.array([problem[0]])
     )
     metadata = {} if recorded is None else {"gravity": recorded}
     score = kp.evaluate_policy(kp.DQN((8,), metadata=metadata), 1, gravity=given)

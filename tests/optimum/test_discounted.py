@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from keras_pendulum.environments.pendulum import pendulum_starts
 from keras_pendulum.errors import ConfigError
-from keras_pendulum.optimum import best_return, discounted
-from keras_pendulum.optimum import optimal_return as optimal_return_module
+from keras_pendulum.optimum import best_return, discounted, pendulum_returns
 from keras_pendulum.optimum.discounted import discounted_value, exact_q, solve_discounted
-from keras_pendulum.optimum.optimal_return import discounted_return, optimal_return
+from keras_pendulum.optimum.pendulum_returns import discounted_return
+from keras_pendulum.optimum.solutions import optimal_return
 from keras_pendulum.optimum.stored_results import Problem, write
 from keras_pendulum.optimum.value_iteration import solve, value_at
 
@@ -45,7 +45,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         table = coarse_table(gravity, discount)
         return table if cells != discounted.CELLS else np.repeat(table, 10, axis=1)[:, 9:]
 
-    monkeypatch.setattr(optimal_return_module, "USUAL_SEEDS", range(20))
+    monkeypatch.setattr(pendulum_returns, "USUAL_SEEDS", range(20))
     monkeypatch.setattr(discounted, "solve_discounted", solve_coarsely)
     monkeypatch.setattr(best_return, "solve_discounted", solve_coarsely)
     return asked

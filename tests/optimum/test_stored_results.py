@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.optimum.optimal_return import optimal_return
+from keras_pendulum.optimum.solutions import optimal_return
 from keras_pendulum.optimum.stored_results import Problem, read_returns, write
 
 pytestmark = pytest.mark.quick
@@ -201,7 +201,7 @@ def test_returns_are_computed_for_a_user_without_a_home_folder(
 def test_stored_returns_are_read_without_heavy_imports() -> None:
     code = (
         "import sys\n"
-        "from keras_pendulum.optimum.optimal_return import optimal_return\n"
+        "from keras_pendulum.optimum.solutions import optimal_return\n"
         "optimal_return()\n"
         "assert not {'tensorflow', 'keras', 'gymnasium', 'matplotlib'} & set(sys.modules)"
     )

@@ -134,7 +134,10 @@ STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
     "long name": (text("twice", "1" * 10_000), "a text of 10000 characters"),
     "infinite number": (layer("twice", n=float("inf")), "twice has the number inf"),
     "number of 400 digits": (text('"n": 2', f'"n": {10**400}'), "twice has a number of 401 digits"),
-    "no model": (lambda members: members.update({"config.json": b"{}"}), "expected Dense layers"),
+    "no model": (
+        lambda members: members.update({"config.json": b"{}"}),
+        "holds a None, not a model",
+    ),
     "nested deeply": (
         lambda members: members.update({"config.json": b'{"class_name":' * 90_000}),
         "",

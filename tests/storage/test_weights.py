@@ -208,7 +208,8 @@ def test_bad_file_is_refused_in_one_line_that_names_it(kind: str, tmp_path: Path
     [
         (lambda: kp.DQN((8,), 1), "the network has one output"),
         (lambda: kp.DQN((8193,), 2), "has 8193 units; expected 1 to 8192"),
-        (lambda: kp.DQN((8,), observation_size=4), "has 4 inputs; expected 3"),
+        (lambda: kp.DQN((8,), observation_size=4), "has 41 outputs; CartPole-v1 has 2"),
+        (lambda: kp.DQN((8,), observation_size=5), "has 5 inputs; expected 3"),
         (lambda: kp.DQN((8,), metadata={"gravity": 1000.0}), "gravity is 1000"),
         (
             lambda: kp.DQN((8,), metadata={"environment": "Acrobot-v1"}),

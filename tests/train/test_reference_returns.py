@@ -7,7 +7,7 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.optimum.optimal_return import discounted_return
+from keras_pendulum.optimum.pendulum_returns import discounted_return
 from keras_pendulum.train.reference_returns import reference_returns, run_title
 from keras_pendulum.version import __version__
 

@@ -13,7 +13,8 @@ from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum import best_return as module
 from keras_pendulum.optimum.best_return import best_return
-from keras_pendulum.optimum.optimal_return import discounted_return, optimal_return
+from keras_pendulum.optimum.pendulum_returns import discounted_return
+from keras_pendulum.optimum.solutions import optimal_return
 from keras_pendulum.optimum.value_iteration import greedy_return, solve, value_tables
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The optimum: the return of the optimal policy of the pendulum from the start of each reset seed.
+"""The returns of the best policies of the pendulum from the start of each reset seed.
 
 The package contains the returns of seeds 0 to 9999 for g = 1 and for g = 10, for whole episodes and
 for the training episodes of `reference` and `swingup`. It contains those of the policies that are
@@ -22,31 +22,6 @@ from keras_pendulum.optimum.solution import USUAL_SEEDS
 from keras_pendulum.optimum.stored_results import Problem, cache_file, read_returns, write_to_cache
 
 
-def optimal_return(
-    gravity: float = 1.0, seeds: Iterable[int] = range(100), steps: int = STEPS_PER_EPISODE
-) -> NDArray[np.float64]:
-    """Returns the highest undiscounted return of an episode from each start `reset(seed=…)`.
-
-    Stored returns are read in milliseconds. Others take about 20 s. They are then stored in the
-    user's cache folder, if it can be written, together with those of seeds 0 to 999.
-
-    Args:
-        gravity: g in m/s², 0 to 100.
-        seeds: reset seeds, each 0 to 2³² - 1.
-        steps: steps per episode, 1 to 200.
-
-    Returns:
-        [number of seeds], in the order of `seeds`; each return is attainable.
-
-    Raises:
-        ConfigError: (a ValueError) for a gravity, a seed or steps out of range.
-
-    >>> kp.optimal_return(gravity=1.0, seeds=range(3)).shape
-    (3,)
-    """
-    return discounted_return(gravity, 1.0, seeds, steps)
-
-
 def discounted_return(
     gravity: float,
     discount: float,
@@ -55,7 +30,17 @@ def discounted_return(
 ) -> NDArray[np.float64]:
     """Returns the undiscounted returns of the policy that is optimal for a discount γ, 0 to 1.
 
-    They are as those of `optimal_return`, which are those for γ = 1. Raises ConfigError for a
+    Those of γ = 1 are the highest possible ones. Stored returns are read in milliseconds. Others
+    take about 20 s. They are then stored in the user's cache folder, if it can be written, together
+    with those of seeds 0 to 999.
+
+    Args:
+        gravity: g in m/s², 0 to 100.
+        discount: γ.
+        seeds: reset seeds, each 0 to 2³² - 1.
+        steps: steps per episode, 1 to 200.
+
+    Returns [number of seeds], in the order of `seeds`; each is attainable. Raises ConfigError for a
     number out of range.
     """
     problem, valid_seed = Problem.valid(gravity, steps, discount), Integer(0, 2**32 - 1)

@@ -1,0 +1,192 @@
+"""The optimal values of CartPole on a grid, by dynamic programming.
+
+V is computed by value iteration, as Bellman describes it (1957, chapter III):
+
+    V(s) = max over both pushes of 1 + γ V(s′),
+
+where V of a terminated state is 0. The reward of the last step is 1, too, as in Gymnasium. Values
+between grid points are interpolated linearly in all four numbers of the state. For γ < 1 the sweeps
+begin above the optimum, with V = 1 / (1 - γ), and end when no value changes by more than
+`TOLERANCE`. For γ = 1 there are 500 sweeps from V = 0: one for each step of an episode.
+
+The mirrored state has the same value, V(-s) = V(s), so half of the grid is computed and stored.
+"""
+
+from __future__ import annotations
+
+import logging
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.config.fields import Number
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.optimum.cartpole_dynamics import (
+    FORCES,
+    LARGEST_ANGLE,
+    LARGEST_POSITION,
+    States,
+    step_forces,
+)
+from keras_pendulum.optimum.stored_results import cache_file, read_arrays, write_arrays_to_cache
+
+_log = logging.getLogger(__name__)
+
+SHAPE = (25, 25, 31, 31)  # points of x, ẋ, θ and θ̇
+HALF = (int(np.prod(SHAPE)) + 1) // 2  # points that are stored
+ENDS = np.array([LARGEST_POSITION, 3.0, LARGEST_ANGLE, 3.0])  # m, m/s, rad, rad/s
+TOLERANCE = 1e-3
+LOOKAHEAD = 4  # exact steps before V is interpolated: near a fall, the grid is coarse
+LARGEST_SWEEPS = 1000
+_STRIDES = np.cumprod([1, *SHAPE[:0:-1]])[::-1]
+
+Table = NDArray[np.float32]  # [HALF]: V at the first half of the grid points
+
+
+def cartpole_value(discount: float) -> Table:
+    """Returns V for a discount γ, 0 to 1.
+
+    The package has those of the usual ones. Others take about 10 s, and are stored in the user's
+    cache folder, if it can be written. Raises ConfigError for a discount out of range.
+    """
+    discount = Number(0, 1).validate("discount", discount) + 0.0  # -0.0 becomes 0.0
+    name = file_name(discount)
+    shipped = Path(str(resources.files("keras_pendulum.optimum"))) / "data" / name
+    cache = cache_file(name)
+    for file in (shipped, cache):
+        if (table := _unpack(read_arrays(file), discount)) is not None:
+            return table
+    _log.warning("Computing the exact values of CartPole for γ = %g, once: about 10 s", discount)
+    table = solve_cartpole(discount)
+    write_arrays_to_cache(cache, pack(table))
+    return table
+
+
+def file_name(discount: float) -> str:
+    """Returns the name of the file of a discount, such as `cartpole_discount_0.99.npz`."""
+    return f"cartpole_discount_{str(discount).removesuffix('.0')}.npz"
+
+
+def pack(table: Table) -> dict[str, NDArray[np.uint8]]:
+    """Returns the arrays of a file: the two bytes of each value as float16.
+
+    Two arrays of bytes take a fifth less space than one of numbers.
+    """
+    bits = table.astype(np.float16).view(np.uint16)
+    return {"high": (bits >> 8).astype(np.uint8), "low": (bits & 255).astype(np.uint8)}
+
+
+def _unpack(arrays: dict[str, NDArray[Any]], discount: float) -> Table | None:
+    """Returns the table of a file's arrays; None where they cannot be right."""
+    parts = [arrays.get("high"), arrays.get("low")]
+    high, low = parts
+    if high is None or low is None:
+        return None
+    if any(each.dtype != np.uint8 or each.shape != (HALF,) for each in (high, low)):
+        return None
+    bits = (high.astype(np.uint16) << 8) | low
+    table = bits.view(np.float16).astype(np.float32)
+    valid = (table >= 1) & (table <= 1.001 * highest_value(discount))  # false for NaN
+    return table if valid.all() else None
+
+
+def highest_value(discount: float) -> float:
+    """Returns the value of a pole that never falls; for γ = 1 that of an episode's 500 steps."""
+    steps = CartPole.steps_per_episode
+    return float(steps) if discount == 1 else 1 / (1 - discount)
+
+
+def solve_cartpole(discount: float) -> Table:
+    """Returns V for a discount γ by value iteration."""
+    axes = [np.linspace(-end, end, count) for end, count in zip(ENDS, SHAPE, strict=True)]
+    grid = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")], axis=1)[:HALF]
+    outcomes = step_forces(grid, FORCES)
+    places = [_Place(outcomes.state[:, action]) for action in range(len(FORCES))]
+    episodic = discount == 1
+    value = np.full(HALF, 0 if episodic else highest_value(discount), np.float32)
+    for _ in range(CartPole.steps_per_episode if episodic else LARGEST_SWEEPS):
+        whole = _whole(value)
+        following = [
+            np.where(outcomes.terminated[:, action], 0, place(whole))
+            for action, place in enumerate(places)
+        ]
+        before, value = value, (1 + discount * np.maximum(*following)).astype(np.float32)
+        if not episodic and np.abs(value - before).max() <= TOLERANCE:
+            break
+    return value
+
+
+def cartpole_q(
+    table: Table, discount: float, states: States, forces: NDArray[np.float64] = FORCES
+) -> NDArray[np.float64]:
+    """Returns the Q-values [N, A] of the optimum: 1 + γ V(next state).
+
+    Args:
+        table: V, from `cartpole_value` for the same discount.
+        discount: γ.
+        states: [N, 4].
+        forces: N, of the first step, [A]. The later ones are those of V: the better of ±10 N.
+    """
+    outcomes = step_forces(states, forces)
+    following = outcomes.state.reshape(-1, 4)
+    values = _looking_ahead(_whole(table), discount, following, LOOKAHEAD)
+    values = values.reshape(outcomes.reward.shape)
+    return outcomes.reward + discount * np.where(outcomes.terminated, 0, values)
+
+
+def value_at(table: Table, discount: float, states: States) -> NDArray[np.float64]:
+    """Returns V at states [N, 4]; beyond the ends of the grid that of the nearest point."""
+    return _looking_ahead(_whole(table), discount, states, LOOKAHEAD)
+
+
+def greedy_forces(table: Table, states: States) -> NDArray[np.float64]:
+    """Returns the forces [N] that lead to the higher V, interpolated without a look ahead."""
+    outcomes, whole = step_forces(states, FORCES), _whole(table)
+    following = [
+        np.where(outcomes.terminated[:, action], 0, _Place(outcomes.state[:, action])(whole))
+        for action in range(len(FORCES))
+    ]
+    return FORCES[(following[1] > following[0]).astype(np.intp)]
+
+
+def _looking_ahead(
+    whole: Table, discount: float, states: States, steps: int
+) -> NDArray[np.float64]:
+    """Returns V [N]: the best sum of rewards over some exact steps, and V after them."""
+    if not steps:
+        return np.asarray(_Place(states)(whole), np.float64)
+    outcomes = step_forces(states, FORCES)
+    following = _looking_ahead(whole, discount, outcomes.state.reshape(-1, 4), steps - 1)
+    following = following.reshape(outcomes.reward.shape)
+    future = np.where(outcomes.terminated, 0, discount * following)
+    return np.asarray((outcomes.reward + future).max(axis=1))
+
+
+def _whole(half: Table) -> Table:
+    """Returns V at all grid points, of which the last half mirrors the first."""
+    return np.concatenate([half, half[-2::-1]])
+
+
+class _Place:
+    """The places of N states between grid points."""
+
+    def __init__(self, states: States) -> None:
+        self.corner = np.zeros(len(states), np.int32)  # the lowest of 16
+        self.weights = []  # of the upper neighbour, for each of the four numbers
+        for number, (end, count) in enumerate(zip(ENDS, SHAPE, strict=True)):
+            position = (states[:, number].clip(-end, end) + end) * ((count - 1) / (2 * end))
+            lower = np.minimum(position.astype(np.int32), count - 2)
+            self.corner = self.corner * count + lower
+            self.weights.append((position - lower).astype(np.float32))
+
+    def __call__(self, whole: Table, number: int = 0, shift: int = 0) -> NDArray[np.float32]:
+        """Returns the values [N], interpolated in the numbers of the state from `number` on."""
+        if number == len(SHAPE):
+            return whole.take(self.corner + shift)
+        low = self(whole, number + 1, shift)
+        high = self(whole, number + 1, shift + int(_STRIDES[number]))
+        interpolated: NDArray[np.float32] = low + self.weights[number] * (high - low)
+        return interpolated
