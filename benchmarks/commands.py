@@ -73,7 +73,13 @@ COMMANDS = (
         packages=("psutil", "torch"),
     ),
     Command("diagnosis.single_faults", 45, (FOLDER,), ("diagnosis",)),
-    Command("diagnosis.strangers", 90, (FOLDER,), ("diagnosis_strangers",), ("torch",)),
+    Command(
+        "diagnosis.strangers",
+        90,
+        (FOLDER,),
+        ("diagnosis_strangers", "diagnosis_cartpole"),
+        ("torch",),
+    ),
     Command("diagnosis.fault_pairs", 60, (FOLDER,), ("diagnosis_pairs",)),
     Command(
         "diagnosis.healthy_networks",
@@ -87,6 +93,7 @@ COMMANDS = (
     Command("speed.original_run", 7, results=("original_run",), packages=("psutil",)),
     Command("speed.inner_loops", 1, results=("inner_loops",), packages=("psutil", "torch")),
     Command("speed.import_time", 1, results=("import_time",), packages=("psutil",)),
+    Command("speed.recorder", 1, results=("recorder",), packages=("psutil",)),
     Command("speed.long_run", 2, results=("long_run",), packages=("psutil",)),
     Command("speed.saving", 2, results=("saving",), packages=("psutil",)),
     Command(

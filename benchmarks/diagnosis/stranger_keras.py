@@ -27,7 +27,7 @@ class KerasNetwork:
         program = self._program
         layers = [keras.layers.Dense(units, program.activation) for units in program.hidden]
         layers.append(keras.layers.Dense(program.torque_count, program.head))
-        return keras.Sequential([keras.Input((3,)), *layers])
+        return keras.Sequential([keras.Input((program.observation_size,)), *layers])
 
     def q_values(self, observations: Array) -> Array:
         """Returns the values [B, A], by NumPy: a call of Keras takes a thousand times as long."""

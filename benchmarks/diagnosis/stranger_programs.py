@@ -1,8 +1,8 @@
 """Small DQN programs as beginners write them, with one mistake each.
 
-`train` is a complete program: Gymnasium's pendulum, a NumPy replay buffer and a network of PyTorch
-or Keras. It shares no code with this package, so `benchmarks.diagnosis.strangers` can measure how
-`diagnose` judges networks of other people. `MISTAKES` lists what can be wrong.
+`train` is a complete program: Gymnasium's environment, a NumPy replay buffer and a network of
+PyTorch or Keras. It shares no code with this package, so `benchmarks.diagnosis.strangers` can
+measure how `diagnose` judges networks of other people. `MISTAKES` lists what can be wrong.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ Array = NDArray[Any]
 class Program:
     """The settings of a program, and its mistakes; the defaults are right."""
 
+    environment: str = "Pendulum-v1"  # or "CartPole-v1"
     library: str = "torch"  # or "keras"
     gravity: float = 10.0
     torque_count: int = 9
@@ -36,12 +37,25 @@ class Program:
     loss: str = "chosen"  # which outputs are compared with which targets
     head: str = "linear"  # activation of the last layer
     copy_every: int = 50  # updates between two copies to the target network; 0 is never
+    soft_copy: float = 0.0  # above 0: this share of the weights is copied at each update
     through_target: bool = False  # whether the gradient passes the target
     ends_always: bool = False  # whether every transition ends its episode
     observation: Callable[[Array], Array] = lambda observation: observation  # in learning
     reward: Callable[[float], float] = lambda reward: reward
+    last_reward: float = 0.0  # that of the step that ends an episode, where it is not 0
     torque: Callable[[Array], Array] = lambda torque: torque  # in learning
     stores_action_before: bool = False
+    stores_greedy: bool = False  # the greedy action in place of the one that acted
+    stores_next_index: bool = False
+    keeps_first_state: bool = False  # as the state of the whole episode
+    truncation_is_end: bool = False
+    ends_never: bool = False  # whether the end of an episode is not stored
+    capacity: int = 10**6  # of the replay buffer
+    consecutive: bool = False  # whether a batch is the last transitions
+    epsilon: Callable[[float], float] = lambda done: max(0.05, 1 - 2 * done)  # by share of the run
+    episode_steps: int = 200
+    start: float | None = None  # rad and rad/s: bound of the starts
+    env_reward: Callable[[Any], Any] | None = None  # of a wrapper
     # The program in use, after learning:
     acting_observation: Callable[[Array], Array] = lambda observation: observation
     acting_torque: Callable[[Array], Array] = lambda torque: torque
@@ -50,9 +64,19 @@ class Program:
     declared_discount: float | None = None
 
     @property
+    def is_cartpole(self) -> bool:
+        """Whether the environment is CartPole."""
+        return self.environment == "CartPole-v1"
+
+    @property
     def torques(self) -> Array:
-        """The torques [A] that the author believes in, in N·m."""
-        return np.linspace(-2, 2, self.torque_count)
+        """The torques [A] in N·m that the author believes in, or the actions of CartPole."""
+        return np.arange(2) if self.is_cartpole else np.linspace(-2, 2, self.torque_count)
+
+    @property
+    def observation_size(self) -> int:
+        """The numbers of an observation."""
+        return 4 if self.is_cartpole else 3
 
 
 @dataclass(frozen=True)
@@ -62,11 +86,15 @@ class Mistake:
     changes: dict[str, Any]
     finding: str
     variant: str = ""
-    also: tuple[str, ...] = ()  # other findings that are right
+    hand_in: tuple[str, ...] = ()  # beside the network: "record", "transitions"
 
 
 def _turn(order: list[int], signs: list[int]) -> Callable[[Array], Array]:
     return lambda observation: observation[..., order] * np.array(signs, np.float32)
+
+
+def _shown(finding: str, hand_in: str, variant: str = "", **changes: Any) -> Mistake:
+    return Mistake(changes, finding, variant, tuple(hand_in.split()))
 
 
 def _wrong_target(variant: str, **changes: Any) -> Mistake:
@@ -107,7 +135,27 @@ MISTAKES: dict[str, Mistake] = {
         {"acting_observation": _turn([1, 0, 2], [1, 1, 1])}, "observation-map"
     ),
     "torques reversed in use": Mistake({"acting_torque": lambda torque: -torque}, "torque-map"),
-    "action of the step before": Mistake({"stores_action_before": True}, "misaligned-transitions"),
+    # What only a record or the transitions show:
+    "action of the step before": _shown(
+        "misaligned-transitions", "transitions", stores_action_before=True
+    ),
+    "no random actions": _shown("exploration", "record", epsilon=lambda done: 0.02),
+    "random actions only": _shown("exploration", "record", epsilon=lambda done: 1.0),
+    "random actions at the end": _shown("exploration", "record", epsilon=lambda done: done),
+    "rewards clipped to -1": _shown("other-reward", "record", env_reward=lambda r: max(r, -1.0)),
+    "truncation stored as an end": _shown(
+        *("no-bootstrapping", "transitions", "truncation"), truncation_is_end=True, episode_steps=25
+    ),
+    "buffer of 300 steps": _shown("forgetting", "record transitions", capacity=300),
+    "greedy index stored": _shown(
+        "misaligned-transitions", "transitions", "greedy-stored", stores_greedy=True
+    ),
+    "no replay": _shown("forgetting", "transitions", "no-replay", capacity=64, consecutive=True),
+    "starts near the top": _shown("narrow-starts", "record", start=0.3, episode_steps=20),
+    "state never updated": _shown(
+        "misaligned-transitions", "transitions", "same-state", keeps_first_state=True
+    ),
+    "index of the next torque stored": _shown("torque-map", "transitions", stores_next_index=True),
 }
 
 # What differs between two right programs.
@@ -130,6 +178,11 @@ def make_program(changes: dict[str, Any], seed: int) -> Program:
         activation=("relu", "tanh")[random.randint(2)],
         seed=seed,
     )
+    if changes.get("environment") == "CartPole-v1":
+        discount = (0.95, 0.98, 0.99)[random.randint(3)]
+        program = replace(
+            program, torque_count=2, discount=discount, steps=15_000, episode_steps=500
+        )
     return replace(program, **changes)
 
 
@@ -152,7 +205,7 @@ class Trained:
 
     program: Program
     weights: list[Array]  # kernel [in, out] and bias of each layer
-    steps: dict[str, Array] = field(default_factory=dict)  # its transitions, in order
+    steps: dict[str, Array] = field(default_factory=dict)  # its replay buffer, in order
 
     def q_values(self, observations: Array) -> Array:
         """Returns the values [B, A] of the program in use."""
@@ -176,53 +229,64 @@ class Trained:
         return np.asarray(q[:, order])
 
 
-def train(program: Program) -> Trained:
-    """Trains; returns the weights and the steps."""
+def train(program: Program, wrap: Callable[[Any], Any] = lambda env: env) -> Trained:
+    """Trains; returns the weights and the replay buffer. `wrap` wraps the environment."""
     random = np.random.RandomState(program.seed)
-    env = gymnasium.make("Pendulum-v1", g=program.gravity)
+    physics: dict[str, Any] = {} if program.is_cartpole else {"g": program.gravity}
+    env: Any = gymnasium.make(program.environment, **physics)
+    if program.env_reward is not None:
+        env = gymnasium.wrappers.TransformReward(env, program.env_reward)
+    env = wrap(env)
+    options = {} if program.start is None else {"x_init": program.start, "y_init": program.start}
     network = _network(program)
     torques = program.torque(program.torques)
-    arrays = [np.zeros((program.steps, *shape), kind) for shape, kind in _COLUMNS]
+    observed = (program.observation_size,)
+    arrays = [np.zeros((program.steps, *shape), kind) for shape, kind in _columns(observed)]
     observation = None
-    acted = 0
+    acted = began = 0
     for step in range(program.steps):
         if observation is None:
-            observation, _ = env.reset(seed=program.seed if step == 0 else None)
+            observation, _ = env.reset(seed=program.seed if step == 0 else None, options=options)
+            began = step
         seen = program.observation(observation)
         greedy = int(network.q_values(seen[None])[0].argmax())
-        explores = random.random_sample() < _epsilon(program, step)
+        explores = random.random_sample() < program.epsilon(step / program.steps)
         acted_before = acted
         acted = random.randint(len(torques)) if explores else greedy
-        following, reward, _, truncated, _ = env.step([torques[acted]])
+        action = int(torques[acted]) if program.is_cartpole else [torques[acted]]
+        following, reward, terminated, truncated, _ = env.step(action)
+        truncated = truncated or step + 1 == began + program.episode_steps
         stored = acted_before if program.stores_action_before else acted
+        stored = greedy if program.stores_greedy else stored
+        stored = (stored + program.stores_next_index) % len(torques)
         gained = program.reward(float(reward))
+        gained = program.last_reward if terminated and program.last_reward else gained
         following_seen = program.observation(following)
-        row = (seen, stored, gained, following_seen, program.ends_always, truncated)
+        ended = terminated and not program.ends_never
+        ended = ended or program.ends_always or (program.truncation_is_end and truncated)
+        row = (seen, stored, gained, following_seen, ended, truncated)
         for array, value in zip(arrays, row, strict=True):
             array[step] = value
-        observation = None if truncated else following
+        following = observation if program.keeps_first_state else following
+        observation = None if terminated or truncated else following
         if step >= 200:
-            rows = random.randint(step + 1, size=64)
+            oldest = max(0, step + 1 - program.capacity)
+            rows = oldest + random.randint(step + 1 - oldest, size=64)
+            if program.consecutive:
+                rows = np.arange(step - 63, step + 1)
             network.update(tuple(array[rows] for array in arrays[:5]))
             if program.copy_every and step % program.copy_every == 0:
                 network.copy()
     env.close()
     names = ("observation", "action", "reward", "next_observation", "terminated", "truncated")
-    return Trained(program, network.weights(), dict(zip(names, arrays, strict=True)))
+    kept = [array[-program.capacity :] for array in arrays]
+    return Trained(program, network.weights(), dict(zip(names, kept, strict=True)))
 
 
-_COLUMNS: tuple[tuple[tuple[int, ...], Any], ...] = (
-    ((3,), np.float32),
-    ((), np.int64),
-    ((), np.float32),
-    ((3,), np.float32),
-    ((), np.float32),
-    ((), np.bool_),
-)
-
-
-def _epsilon(program: Program, step: int) -> float:
-    return max(0.05, 1 - step / (0.5 * program.steps))
+def _columns(observed: tuple[int, ...]) -> list[tuple[tuple[int, ...], Any]]:
+    """Returns shape and type of each column of the replay buffer."""
+    observation, number = (observed, np.float32), ((), np.float32)
+    return [observation, ((), np.int64), number, observation, number, ((), np.bool_)]
 
 
 def _network(program: Program) -> Any:

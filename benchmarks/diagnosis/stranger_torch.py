@@ -21,7 +21,7 @@ class TorchNetwork:
         torch.manual_seed(program.seed)
         activation = nn.Tanh if program.activation == "tanh" else nn.ReLU
         layers: list[nn.Module] = []
-        sizes = [3, *program.hidden]
+        sizes = [program.observation_size, *program.hidden]
         for inputs, outputs in pairwise(sizes):
             layers += [nn.Linear(inputs, outputs), activation()]
         layers.append(nn.Linear(sizes[-1], program.torque_count))
@@ -63,6 +63,12 @@ class TorchNetwork:
         self._adam.zero_grad()
         loss.backward()
         self._adam.step()
+        if share := self._program.soft_copy:
+            with torch.no_grad():
+                for ours, theirs in zip(
+                    self._target.parameters(), self.online.parameters(), strict=True
+                ):
+                    ours.lerp_(theirs, share)
 
     def _targets(self, following: Any, same: Any, r: Any, end: Any) -> Any:
         kind = self._program.target

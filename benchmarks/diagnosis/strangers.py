@@ -1,10 +1,11 @@
 """How often a diagnosis is right about networks of programs that share no code with this package.
 
-    python -m benchmarks.diagnosis.strangers FOLDER [FIRST_SEED ROUNDS]
+    python -m benchmarks.diagnosis.strangers FOLDER [FIRST_SEED ROUNDS [ENVIRONMENT]]
 
-Trains the programs of `benchmarks.diagnosis.stranger_programs` in FOLDER: one of each mistake in
-each round, and two of each right one. Each program has a seed of its own, from FIRST_SEED on
-(9000). The limits of the equations were set on the seeds 1000 to 8199. The command may be stopped
+Trains the programs of `benchmarks.diagnosis.stranger_programs`, or with CartPole-v1 those of
+`benchmarks.diagnosis.cartpole_programs`, in FOLDER: one of each mistake in each round, and two of
+each right one. Each program has a seed of its own, from FIRST_SEED on
+(9000). The limits of the rules were set on the seeds 1000 to 8199. The command may be stopped
 and started again: networks and diagnoses in FOLDER are used again. Remove FOLDER/strangers.jsonl
 after a change of the rules. Needs torch. Eight rounds take an hour and a half.
 """
@@ -19,19 +20,28 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.diagnosis import stranger_programs
+from benchmarks.diagnosis.cartpole_programs import CARTPOLE_MISTAKES, CARTPOLE_RIGHT
 from benchmarks.diagnosis.resumable import Result, measure_each
 from benchmarks.diagnosis.single_faults import counts, share
-from benchmarks.diagnosis.stranger_programs import MISTAKES, RIGHT, Trained, make_program, train
+from benchmarks.diagnosis.stranger_programs import Trained, make_program, train
 from benchmarks.result_files import Row, write
 
-KINDS = [*RIGHT, *MISTAKES]
+RIGHT = stranger_programs.RIGHT | CARTPOLE_RIGHT
+MISTAKES = stranger_programs.MISTAKES | CARTPOLE_MISTAKES
+KINDS = {
+    "Pendulum-v1": [*stranger_programs.RIGHT, *stranger_programs.MISTAKES],
+    "CartPole-v1": [*CARTPOLE_RIGHT, *CARTPOLE_MISTAKES],
+}
 HEALTHY = ("no finding", "not-converged")
 
 
-def programs(first_seed: int, rounds: int) -> Iterator[tuple[str, int]]:
+def programs(
+    first_seed: int, rounds: int, environment: str = "Pendulum-v1"
+) -> Iterator[tuple[str, int]]:
     """Yields kind and seed of each program."""
     for round_ in range(rounds):
-        for number, kind in enumerate(KINDS):
+        for number, kind in enumerate(KINDS[environment]):
             seed = first_seed + 100 * number + 2 * round_
             yield kind, seed
             if kind in RIGHT:
@@ -42,14 +52,23 @@ def train_program(kind: str, seed: int, folder: Path) -> Trained:
     """Returns the trained program; one in the folder is used again."""
     changes = RIGHT[kind] if kind in RIGHT else MISTAKES[kind].changes
     program = make_program(changes, seed)
-    path = folder / f"{kind}_{seed}.npz"
+    path, run = program_files(kind, seed, folder)
     if not path.exists():
-        trained = train(program)
+        import keras_pendulum as kp
+
+        recorders: list[Any] = []
+
+        def wrap(env: Any) -> Any:
+            recorders.append(kp.Recorder(env))
+            return recorders[0]
+
+        trained = train(program, wrap)
         layers: dict[str, Any] = {
             f"layer{number:02}": array for number, array in enumerate(trained.weights)
         }
         part = path.with_suffix(".part.npz")
         part.parent.mkdir(parents=True, exist_ok=True)
+        recorders[0].save(run)
         np.savez_compressed(part, **layers | trained.steps)
         part.rename(path)
     with np.load(path) as file:
@@ -58,16 +77,26 @@ def train_program(kind: str, seed: int, folder: Path) -> Trained:
         return Trained(program, [file[name] for name in names], steps)
 
 
+def program_files(kind: str, seed: int, folder: Path) -> tuple[Path, Path]:
+    """Returns the files of a program: weights and replay buffer, and what its recorder saved."""
+    return folder / f"{kind}_{seed}.npz", folder / f"{kind}_{seed}_run.npz"
+
+
 def diagnose_program(kind: str, seed: int, folder: Path) -> Result:
     """Returns the findings on the network of a program, with what its author declares."""
     import keras_pendulum as kp
 
     trained = train_program(kind, seed, folder)
     program = trained.program
+    hand_in = MISTAKES[kind].hand_in if kind in MISTAKES else ()
+    torques = None if program.is_cartpole else program.torques
+    names = ("observation", "action", "reward", "next_observation", "terminated")
     diagnosis = kp.diagnose(
-        kp.q_function(trained.q_values, program.torques, f"{kind} {seed}"),
-        gravity=program.declared_gravity or program.gravity,
+        kp.q_function(trained.q_values, torques, f"{kind} {seed}"),
+        gravity=None if program.is_cartpole else program.declared_gravity or program.gravity,
         discount=program.declared_discount or program.discount,
+        record=program_files(kind, seed, folder)[1] if "record" in hand_in else None,
+        transitions=[trained.steps[each] for each in names] if "transitions" in hand_in else None,
     )
     measurement = diagnosis.measurement
     return {
@@ -90,7 +119,9 @@ def is_right(result: Result) -> bool:
     if result["kind"] in RIGHT:
         return first(result) in HEALTHY
     mistake = MISTAKES[result["kind"]]
-    return [mistake.finding, mistake.variant] == [*result["findings"], [None]][0]
+    name, variant = [*result["findings"], ["", ""]][0]
+    # Where every output is 1, no value shows whether it is `tanh or sigmoid`.
+    return name == mistake.finding and mistake.variant in variant.split(" or ")
 
 
 def is_harmless(result: Result) -> bool:
@@ -100,7 +131,8 @@ def is_harmless(result: Result) -> bool:
 
 def summarize(results: list[Result]) -> list[Row]:
     """Returns a row for each kind, and one for all mistakes and for all right programs."""
-    rows = [_row(kind, [each for each in results if each["kind"] == kind]) for kind in KINDS]
+    kinds = dict.fromkeys(str(result["kind"]) for result in results)
+    rows = [_row(kind, [each for each in results if each["kind"] == kind]) for kind in kinds]
     wrong = [each for each in results if each["kind"] in MISTAKES]
     right = [each for each in results if each["kind"] in RIGHT]
     return [*rows, _row("all mistakes", wrong), _row("all right programs", right)]
@@ -116,15 +148,22 @@ def _row(name: str, results: list[Result]) -> Row:
     }
 
 
-def main(folder: str, first_seed: str = "9000", rounds: str = "8") -> None:
+def main(
+    folder: str,
+    first_seed: str = "9000",
+    rounds: str = "8",
+    environment: str = "Pendulum-v1",
+) -> None:
     """Trains, diagnoses and writes the results."""
     items = (
         (f"{kind} {seed}", partial(diagnose_program, kind, seed, Path(folder)))
-        for kind, seed in programs(int(first_seed), int(rounds))
+        for kind, seed in programs(int(first_seed), int(rounds), environment)
     )
     results = measure_each(items, folder, "strangers")
     command = f"python -m benchmarks.diagnosis.strangers FOLDER {first_seed} {rounds}"
-    write("diagnosis_strangers", command, summarize(results))
+    command += "" if environment == "Pendulum-v1" else f" {environment}"
+    name = "strangers" if environment == "Pendulum-v1" else "cartpole"
+    write(f"diagnosis_{name}", command, summarize(results))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from keras_pendulum.cli import (
     OneLineParser,
+    add_environment_flag,
     add_torques_flag,
     nonempty_path,
     print_json,
@@ -28,7 +29,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     """Runs the command; returns its exit status."""
     parser = OneLineParser(
         prog=prog,
-        description="Compare an agent of the pendulum with the exact solution, and name its fault.",
+        description="Compare an agent with the exact solution of its task, and name its fault.",
     )
     agent = parser.add_argument(
         "agent",
@@ -37,6 +38,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         help="a weights file, the name of a shipped one, file.py:name, package.module:name, or a "
         "run folder (its history and replay buffer are used, too)",
     )
+    add_environment_flag(parser)
     parser.add_argument(
         "--gravity",
         type=float,
@@ -44,7 +46,10 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         help="gravity in m/s² [recorded in the file, else the better one of 10 and 1]",
     )
     parser.add_argument(
-        "--discount", type=float, metavar="γ", help="discount [recorded in the file, else 0.9]"
+        "--discount",
+        type=float,
+        metavar="γ",
+        help="discount [recorded in the file, else 0.9, and 0.99 for CartPole]",
     )
     add_torques_flag(parser)
     parser.add_argument(
@@ -52,6 +57,12 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         type=float,
         metavar="FACTOR",
         help="factor on the rewards in training [recorded in the file, else 1]",
+    )
+    parser.add_argument(
+        "--record",
+        type=nonempty_path,
+        metavar="RUN.npz",
+        help="what a kp.Recorder saved of the training (docs/agents.md)",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(
@@ -77,16 +88,18 @@ def _diagnose(arguments: argparse.Namespace) -> int:
     agent, torques = arguments.agent, arguments.torques
     with prints_to_stderr() if arguments.json else contextlib.nullcontext():
         if find_run_if_folder(agent) is None:
-            policy = named_policy(agent, torques)
+            policy = named_policy(agent, torques, environment=arguments.environment)
             policy.name = agent
             agent, torques = policy, None
         with status("Playing, and comparing with the exact solution") as report:
             diagnosis = diagnose(
                 agent,
+                environment=arguments.environment,
                 gravity=arguments.gravity,
                 discount=arguments.discount,
                 torques=torques,
                 reward_scale=arguments.reward_scale,
+                record=arguments.record,
                 on_progress=report,
             )
             content, summary = diagnosis.as_json(), diagnosis.summary()

@@ -19,11 +19,11 @@ def observation_map(m: Measurement) -> Finding | None:
     if actions is None or actions.declared > SAME_ACTIONS:
         return None
     if actions.by_observation > max(SAME_ACTIONS, actions.declared + 0.3):
-        evidence = "correlation of the torques with those of the run "
+        evidence = f"correlation of the {m.dynamics.effort}s with those of the run "
         evidence += f"{actions.declared:.2f}, with the observation [{actions.observation}] "
         evidence += f"{actions.by_observation:.2f}"
         repair = repairs.change_observations(m, actions.observation)
-        return Finding("observation-map", evidence, "best as it is", repair)
+        return Finding("observation-map", evidence, "best as it is", repair, proven=True)
     return None
 
 
@@ -33,33 +33,36 @@ def torque_map(m: Measurement) -> Finding | None:
     if actions is not None:
         if actions.declared > SAME_ACTIONS:
             return None
-        if actions.by_torques > max(SAME_ACTIONS, actions.declared + 0.3):
+        if actions.by_efforts > max(SAME_ACTIONS, actions.declared + 0.3):
             return Finding(
                 "torque-map",
-                f"correlation of the torques with those of the run {actions.declared:.2f}, with "
-                f"each output in its place {actions.by_torques:.2f}",
+                f"correlation of the {m.dynamics.effort}s with those of the run "
+                f"{actions.declared:.2f}, with each output in its place {actions.by_efforts:.2f}",
                 "the same",
-                repairs.change_torques(
-                    m, actions.torques, "each output with the torque that the run stored for it"
+                repairs.change_efforts(
+                    m,
+                    actions.efforts,
+                    f"each output with the {m.dynamics.effort} that the run stored for it",
                 ),
+                proven=True,
             )
     different = np.unique(m.learned_q, axis=1).shape[1]
     if 1 < different < m.learned_q.shape[1] / 2:
         evidence = f"{m.learned_q.shape[1]} outputs with {different} different values"
         return Finding("torque-map", evidence, "all different")
-    if m.value.correlation < 0.9 or not 0.5 < m.value.slope < 2:
+    if m.value.correlation < 0.9 or not 0.5 < m.value.slope < 2 or not m.dynamics.any_effort:
         return None
     matched = comparisons.matched_correlation(m)
     if matched > 0.4 and matched > m.advantage.correlation + 0.2:
-        torques = np.empty_like(m.torques)
-        torques[np.argsort(m.output_torques, kind="stable")] = np.sort(m.torques)
+        torques = np.empty_like(m.efforts)
+        torques[np.argsort(m.output_efforts, kind="stable")] = np.sort(m.efforts)
         name = "each output with the torque that it behaves like"
         return Finding(
             "torque-map",
             f"correlation of the advantages {m.advantage.correlation:.2f}, with each output in "
             f"its place {matched:.2f}",
             "the same",
-            repairs.change_torques(m, torques, name),
+            repairs.change_efforts(m, torques, name),
         )
     gain = m.advantage_size / m.value.slope  # noise only makes it larger
     if m.advantage.correlation > 0.4 and gain < 0.42:
@@ -67,6 +70,6 @@ def torque_map(m: Measurement) -> Finding | None:
             "torque-map",
             f"outputs that behave like {gain:.2f} times their torques",
             "above 0.55 times",
-            repairs.change_torques(m, gain * m.torques, f"torques times {gain:.2g}"),
+            repairs.change_efforts(m, gain * m.efforts, f"torques times {gain:.2g}"),
         )
     return None

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.signals import Array, advantages, line_fit
-from keras_pendulum.diagnosis.states import OBSERVATION_CHANGES, observe
-from keras_pendulum.optimum.dynamics import step_all_torques
+from keras_pendulum.diagnosis.states import observation_changes
+from keras_pendulum.environments.task import Task
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
 
 class Backup(NamedTuple):
@@ -19,19 +20,38 @@ class Backup(NamedTuple):
 
     q: Array  # [N, A]
     reward: Array  # [N, A]
-    next_q: Array  # [N, A, A]: the last axis is the torque of the next step
+    next_q: Array  # [N, A, A]: the last axis is the action of the next step
     discount: float  # γ
-    next_observation: NDArray[np.float32]  # [N · A, 3]
+    next_observation: NDArray[np.float32]  # [N · A, D]
+    continues: NDArray[np.bool_]  # [N, A]: whether the step does not terminate the episode
 
     @property
     def right(self) -> Array:
         """The right targets [N, A]."""
-        return self.reward + self.discount * self.next_q.max(axis=2)
+        return np.asarray(self.reward + self.future * self.next_q.max(axis=2))
+
+    @property
+    def future(self) -> Array:
+        """The factor [N, A] on the next values: γ, or 0 where the step terminates the episode."""
+        factor: Array = self.discount * self.continues.astype(np.float64)
+        return factor
+
+    @property
+    def spread(self) -> float:
+        """The standard deviation of the values.
+
+        Where episodes terminate, it is at least a part of their size: there, the values of a wrong
+        program may be the same everywhere.
+        """
+        least = 0.0
+        if not self.continues.all():
+            least = max(0.1 * np.abs(self.reward).mean(), 0.02 * np.abs(self.q).mean())
+        return max(float(self.q.std()), float(least), 1e-12)
 
     @property
     def offset(self) -> Array:
-        """The values minus the rewards of one step, [N, A]."""
-        return self.q - self.reward
+        """The values minus the rewards of one step, of the steps that do not terminate, [M]."""
+        return (self.q - self.reward)[self.continues]
 
     @property
     def offset_is_smooth(self) -> bool:
@@ -39,16 +59,16 @@ class Backup(NamedTuple):
 
         So is the value of a network that has never learned.
         """
-        observed = self.next_observation.astype(float)
+        observed = self.next_observation[self.continues.ravel()].astype(float)
         causes = np.column_stack([np.ones(len(observed)), observed, np.abs(observed[:, 2])])
-        offset = self.offset.ravel()
+        offset = self.offset
         solution, *_ = np.linalg.lstsq(causes, offset, rcond=None)
         return bool((offset - causes @ solution).var() < 0.4 * offset.var())
 
     @property
     def reward_factor(self) -> float:
         """The factor on the rewards with which the values obey the right equation best."""
-        rest = self.q - self.discount * self.next_q.max(axis=2)
+        rest = self.q - self.future * self.next_q.max(axis=2)
         return float((rest * self.reward).sum() / max((self.reward**2).sum(), 1e-12))
 
 
@@ -56,39 +76,40 @@ class Backup(NamedTuple):
 class Visited:
     """A network at the states that it visits, and its declared task."""
 
-    q_values: Callable[[NDArray[np.float32]], Array]  # from observations [B, 3] to [B, A]
-    states: Array  # [N, 2], θ in rad and θ̇ in rad/s
-    torques: Array  # N·m of the outputs, [A]
-    gravity: float  # m/s²
+    q_values: Callable[[NDArray[np.float32]], Array]  # from observations [B, D] to [B, A]
+    states: Array  # [N, S]
+    efforts: Array  # of the outputs, [A]
+    dynamics: KnownDynamics
     discount: float  # γ
 
     def backup(
         self,
-        gravity: float | None = None,
-        torques: Array | None = None,
+        task: Task | None = None,
+        efforts: Array | None = None,
         observation: str | None = None,
     ) -> Backup:
         """Returns the values at the states and at all that can follow.
 
         Args:
-            gravity: m/s², in place of the declared one.
-            torques: N·m of the outputs [A], in place of the declared ones.
-            observation: one of `OBSERVATION_CHANGES`, made before the network sees the observation.
+            task: in place of the declared one.
+            efforts: of the outputs [A], in place of the declared ones.
+            observation: one of `observation_changes`, made before the network sees the observation.
         """
-        change, states = np.eye(3, dtype=np.float32), self.states
+        dynamics, states = self.dynamics, self.states
+        if task is not None:
+            dynamics = type(dynamics)(task)
+        change = np.eye(len(dynamics.observation_sizes), dtype=np.float32)
         if observation is not None:  # there are many, so a quarter of the states is enough
-            change, states = OBSERVATION_CHANGES[observation], self.states[::4]
-        reward, theta, speed = step_all_torques(
-            self.gravity if gravity is None else gravity,
-            states[:, 0],
-            states[:, 1],
-            self.torques if torques is None else torques,
-        )
-        following = np.stack([theta.ravel(), speed.ravel()], axis=1)
-        next_observation: NDArray[np.float32] = observe(following) @ change
-        next_q = self.q_values(next_observation).reshape(*reward.shape, -1)
-        q = self.q_values(observe(states) @ change)
-        return Backup(q, reward, next_q, self.discount, next_observation)
+            change, states = observation_changes(dynamics)[observation], self.states[::4]
+        outcomes = dynamics.outcomes(states, self.efforts if efforts is None else efforts)
+        following = outcomes.state.reshape(-1, states.shape[1])
+        next_observation: NDArray[np.float32] = dynamics.observe(following) @ change
+        next_q = self.q_values(next_observation).reshape(*outcomes.reward.shape, -1)
+        q = self.q_values(dynamics.observe(states) @ change)
+        reward, ended = outcomes.reward, outcomes.terminated
+        if ended.any():  # many programs give the last step a penalty, which is no mistake
+            reward = np.where(ended, min(float(reward.mean()), float(q[ended].mean())), reward)
+        return Backup(q, reward, next_q, self.discount, next_observation, ~ended)
 
 
 class Agreement(NamedTuple):
@@ -98,15 +119,18 @@ class Agreement(NamedTuple):
     correlation: float  # of the advantages of Q with those of the target
     advantages: float  # spread of the advantages of Q, over that of the right targets
     position: float  # of Q on the way from the right targets, 0, to these, 1
+    at_ends: float = 0.0  # mean of Q where the step ends the episode, as a share of the mean
 
 
 def agreement(values: Backup, target: Array) -> Agreement:
     """Returns how well the values agree with targets [N, A]."""
     learned, right = advantages(values.q).std(), advantages(values.right).std()
+    has_ends = not values.continues.all()
     way, error = target - values.right, values.q - values.right
     return Agreement(
-        float(np.sqrt(np.mean((values.q - target) ** 2)) / max(values.q.std(), 1e-12)),
+        float(np.sqrt(np.mean((values.q - target) ** 2)) / values.spread),
         line_fit(advantages(values.q), advantages(target)).correlation,
         float(learned / max(right, 1e-12)),
         float((way * error).sum() / max((way**2).sum(), 1e-12)),
+        float(values.q[~values.continues].mean() / values.q.mean()) if has_ends else 0.0,
     )

@@ -1,4 +1,4 @@
-"""An agent compared with the record of its run, and its outputs with those of other torques."""
+"""An agent compared with the record of its run, and its outputs with those of other efforts."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.run_record import RunRecord
-from keras_pendulum.diagnosis.signals import Array, advantage_fit, line_fit, output_torques
-from keras_pendulum.diagnosis.states import OBSERVATION_CHANGES
+from keras_pendulum.diagnosis.signals import Array, advantage_fit, line_fit, output_efforts
+from keras_pendulum.diagnosis.states import observation_changes
 
-SAME_ACTIONS = 0.8  # correlation of an agent's torques with those that its run stored
+SAME_ACTIONS = 0.8  # correlation of an agent's efforts with those that its run stored
 
 
 def matched_correlation(m: Measurement) -> float:
@@ -19,18 +19,18 @@ def matched_correlation(m: Measurement) -> float:
 
     The order comes from the even states, the correlation from the odd ones.
     """
-    found = output_torques(m.learned_q[::2], m.exact_q[::2], m.torques)
+    found = output_efforts(m.learned_q[::2], m.exact_q[::2], m.efforts)
     order = np.argsort(found, kind="stable")
-    exact = m.exact_q[1::2][:, np.argsort(m.torques)]
+    exact = m.exact_q[1::2][:, np.argsort(m.efforts)]
     return advantage_fit(m.learned_q[1::2][:, order], exact).correlation
 
 
 class ActionMatch(NamedTuple):
-    """The correlation of the torques that an agent chooses with those that its run stored."""
+    """The correlation of the efforts that an agent chooses with those that its run stored."""
 
     declared: float  # of the agent as it is
-    torques: Array  # [A]: the torque that the run stored most often where an output is chosen
-    by_torques: float  # with these torques, on transitions that did not choose them
+    efforts: Array  # [A]: the effort that the run stored most often where an output is chosen
+    by_efforts: float  # with these efforts, on transitions that did not choose them
     observation: str  # the change of the observation that matches best
     by_observation: float  # with this change
 
@@ -42,25 +42,25 @@ def match_actions(m: Measurement) -> ActionMatch | None:
     """
     if m.record is None or len(m.record.replay.action) < 200:
         return None
-    observations, torques = m.record.replay.observation[-1000:], m.torques
+    observations, efforts = m.record.replay.observation[-1000:], m.efforts
     stored = m.record.replay.action[-1000:]
 
     def match_stored(acted: Array) -> float:
-        return line_fit(acted, torques[stored]).correlation
+        return line_fit(acted, efforts[stored]).correlation
 
     chosen = m.q_values(observations).argmax(axis=1)
-    counts = np.zeros((len(torques), len(torques)), np.intp)
+    counts = np.zeros((len(efforts), len(efforts)), np.intp)
     np.add.at(counts, (chosen[::2], stored[::2]), 1)
-    found = np.where(counts.any(axis=1), torques[counts.argmax(axis=1)], torques)
+    found = np.where(counts.any(axis=1), efforts[counts.argmax(axis=1)], efforts)
     by_change = {
         name: match_stored(m.act(observations @ change))
-        for name, change in OBSERVATION_CHANGES.items()
+        for name, change in observation_changes(m.dynamics).items()
     }
     best = max(by_change, key=lambda name: by_change[name])
     return ActionMatch(
         match_stored(m.act(observations)),
         found,
-        line_fit(found[chosen[1::2]], torques[stored[1::2]]).correlation,
+        line_fit(found[chosen[1::2]], efforts[stored[1::2]]).correlation,
         best,
         by_change[best],
     )
@@ -73,7 +73,7 @@ def stored_errors(m: Measurement, record: RunRecord) -> tuple[float, float]:
     discount.
     """
     replay = record.replay
-    reward = replay.reward / record.config.reward_scale
+    reward = replay.reward / m.reward_scale
     learned = m.q_values(replay.observation)[np.arange(len(reward)), replay.action]
     target = reward + m.discount * m.q_values(replay.next_observation).max(axis=1)
     spread = max(float(reward.std()), 1e-9)

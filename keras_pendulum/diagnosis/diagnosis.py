@@ -9,22 +9,24 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from keras_pendulum.config.config import Config
 from keras_pendulum.config.fields import Number
 from keras_pendulum.diagnosis.faults import Finding
-from keras_pendulum.diagnosis.findings import find
+from keras_pendulum.diagnosis.findings import find, find_in_record
 from keras_pendulum.diagnosis.measurement import STARTS, Measurement
 from keras_pendulum.diagnosis.repairs import find_by_repairs
-from keras_pendulum.diagnosis.run_record import read_record
-from keras_pendulum.diagnosis.states import observe
+from keras_pendulum.diagnosis.run_record import make_record, read_record
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.environments.pendulum import require_pendulum
+from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.evaluation import USUAL_GRAVITIES, find_task
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.q_policies import q_function
 from keras_pendulum.evaluate.sources import as_policy
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
+from keras_pendulum.optimum.solutions import solution
 from keras_pendulum.status import Report
 from keras_pendulum.storage.run_folder import find_run_if_folder
 
@@ -35,8 +37,8 @@ _STARTS_BY_SECONDS = ((2e-3, STARTS), (1e-2, 12), (math.inf, 4))  # of one call
 _PLAYS = 10  # of all starts, at most, for a policy without Q-values
 _BARE_POLICY = "without Q-values, faults of the training cannot be seen"
 _NO_RUN = (
-    "number of updates, learning rate, exploration, narrow starts and a small replay buffer leave "
-    "no sure trace in a network. A run folder shows them"
+    "learning rate, exploration, narrow starts and a small replay buffer leave no sure trace in a "
+    "network. A run folder, record= (--record) or transitions= shows them"
 )
 
 
@@ -64,8 +66,9 @@ class Diagnosis:
         if m.regret <= m.regret_tolerance:
             return f"No finding: {regret}. {allowed}."
         if not m.policy.has_q_values:
-            same = np.ptp(m.first_torques) == 0
-            reason = "it gives the same torque at all starts" if same else "no repair helps"
+            same = np.ptp(m.first_efforts) == 0
+            same_effort = f"it gives the same {m.dynamics.effort} at all starts"
+            reason = same_effort if same else "no repair helps"
             return (
                 f"Undetermined: {regret}. {allowed}. Nothing more can be said, because the agent "
                 f"gives no Q-values and {reason}: give them with kp.q_function (docs/agents.md)."
@@ -81,9 +84,11 @@ class Diagnosis:
     def declared(self) -> str:
         """The declared task: gravity, discount, torques and size of the reward."""
         m = self.measurement
-        text = f"g = {m.task.gravity:g}, γ = {m.discount:g}"
-        if m.policy.actions is not None:
-            text += f", {len(m.torques)} torques from {m.torques[0]:g} to {m.torques[-1]:g} N·m"
+        gravity = m.task.gravity
+        text = m.task.environment if gravity is None else f"g = {gravity:g}"
+        text += f", γ = {m.discount:g}"
+        if m.policy.actions is not None and m.dynamics.any_effort:
+            text += f", {len(m.efforts)} torques from {m.efforts[0]:g} to {m.efforts[-1]:g} N·m"
         if m.policy.has_q_values:
             text += f", rewards times {m.reward_scale:g}"
         return text
@@ -115,6 +120,7 @@ class Diagnosis:
         measurement = self.measurement
         return {
             "agent": measurement.policy.name,
+            "environment": measurement.task.environment,
             "gravity": measurement.task.gravity,
             "discount": measurement.discount,
             "starts": measurement.start_count,
@@ -148,45 +154,67 @@ class Diagnosis:
 def diagnose(
     agent: Any,
     *,
+    environment: str | None = None,
     gravity: float | None = None,
     discount: float | None = None,
     torques: ArrayLike | None = None,
     reward_scale: float | None = None,
+    record: Any = None,
+    transitions: Any = None,
     on_progress: Report = lambda share: None,
 ) -> Diagnosis:
-    """Returns the diagnosis of an agent of Pendulum-v1.
+    """Returns the diagnosis of an agent of Pendulum-v1 or CartPole-v1.
 
     Args:
         agent: what `evaluate_policy` takes, or a run folder (its history and replay buffer are
             used, too).
+        environment: as in `evaluate_policy`.
         gravity: declared g in m/s²; None takes the recorded one, else the better one of 10 and 1,
             and the summary says so.
-        discount: declared γ; None takes the recorded one, else 0.9, and the
+        discount: declared γ; None takes the recorded one, else 0.9 (0.99 for CartPole), and the
             summary says so.
         torques: N·m of the outputs, as in `evaluate_policy`.
         reward_scale: declared factor on the rewards; None takes the recorded one, else 1.
+        record: a `kp.Recorder` that was around the environment during the training, or the path of
+            the file that its `save` wrote.
+        transitions: the content of the program's replay buffer: five arrays (s, a, r, s′, done), or
+            a list of such tuples. An action is the index of a torque, or a torque in N·m.
         on_progress: called with the share of the episodes that are played, 0 to 1, of a policy
             without Q-values. A slow one plays fewer starts, and the summary says how many.
 
-    Raises ConfigError for a gravity, discount, torques or reward scale out of range and for
-    CartPole, and as `evaluate_policy` does.
+    Raises ConfigError for a gravity, discount, torques or reward scale out of range, for a record
+    or transitions that are not those of the environment, and as `evaluate_policy` does.
 
     >>> [finding.name for finding in kp.diagnose("original").findings]
     ['too-few-updates']
     """
     folder = find_run_if_folder(agent)
-    record = None if folder is None else read_record(folder)
+    if folder is not None and not (record is None and transitions is None):
+        raise ConfigError(
+            f"{folder.path} is a run folder, which has a record of its own: leave out record= and "
+            "transitions=, or name its weights file"
+        )
     if isinstance(agent, DQN) and not all(np.isfinite(each).all() for each in agent.get_weights()):
         agent = q_function(agent, name="DQN")  # no policy, but its values can be diagnosed
-    policy = as_policy(agent if folder is None else folder.weights, torques)
+    source = agent if folder is None else folder.weights
+    policy = as_policy(source, torques, environment=environment)
     unknown = gravity is None and policy.info.task is None
     if unknown and policy.has_q_values and not _are_finite(policy):
         gravity = USUAL_GRAVITIES[0]  # no task can be found by playing
-    found, assumption = find_task(policy, gravity)
-    task = require_pendulum(found, policy.name, "diagnose is for Pendulum-v1")
+    task, assumption = find_task(policy, gravity)
+    dynamics = solution(task)
+    if not isinstance(dynamics, KnownDynamics):
+        raise ConfigError(
+            f"{policy.name} belongs to {task.environment}; diagnose is for {' and '.join(TASKS)}"
+        )
+    if folder is None:
+        outputs = None if policy.actions is None else dynamics.all_efforts(policy.actions)
+        run = make_record(record, transitions, outputs, dynamics)
+    else:
+        run = read_record(folder)
     sentences = [assumption] if assumption else []
     if discount is None and (discount := policy.info.discount) is None:
-        discount = Config.discount
+        discount = task.usual_discount
         sentences.append(
             f"The agent records no discount. {discount:g} was assumed: declare yours with "
             "discount= (--discount)"
@@ -203,17 +231,22 @@ def diagnose(
         played += count
         on_progress(min(1.0, played / total))
 
-    measurement = Measurement(policy, task, discount, reward_scale, record, starts, report)
+    measurement = Measurement(policy, task, discount, reward_scale, run, starts, report)
     return replace(diagnose_measurement(measurement), assumptions=sentences)
 
 
+def _upright(task: Task) -> NDArray[np.float32]:
+    """Returns an observation [1, D]."""
+    return np.eye(1, task.observation_size, dtype=np.float32)
+
+
 def _are_finite(policy: Policy) -> bool:
-    return bool(np.isfinite(policy.q_values(observe(np.zeros((1, 2))))).all())
+    return bool(np.isfinite(policy.q_values(_upright(policy.task))).all())
 
 
 def _start_count(policy: Policy) -> int:
     """Returns the number of starts: fewer for a policy that needs long for one observation."""
-    observation = observe(np.zeros((1, 2)))
+    observation = _upright(policy.task)
     policy.act(observation)  # the first call may compile something
     began = time.perf_counter()
     policy.act(observation)
@@ -225,8 +258,10 @@ def diagnose_measurement(measurement: Measurement) -> Diagnosis:
     """Returns the diagnosis of an agent whose task is declared."""
     tolerance = measurement.regret_tolerance
     if not measurement.policy.has_q_values:
-        findings = find_by_repairs(measurement) if measurement.regret > tolerance else []
-        return Diagnosis(measurement, findings, [], [_BARE_POLICY])
+        shown = find_in_record(measurement)
+        if measurement.regret <= tolerance:
+            return Diagnosis(measurement, [], shown, [_BARE_POLICY])
+        return Diagnosis(measurement, shown or find_by_repairs(measurement), [], [_BARE_POLICY])
     good = measurement.finite and measurement.regret <= tolerance
     found = find(measurement)
     if not good:
@@ -252,7 +287,7 @@ def _signals(m: Measurement) -> dict[str, float]:
         "advantage_correlation": m.advantage.correlation,
         "right_equation_error": m.right_agreement.error,
         "right_equation_correlation": m.right_agreement.correlation,
-        "predicted_return": float(m.q_values(observe(m.starts)).max(axis=1).mean()),
+        "predicted_return": float(m.q_values(m.dynamics.observe(m.starts)).max(axis=1).mean()),
         "collected_return": float(m.episodes.returns_to_go(m.discount)[0].mean()),
         "largest_outlier": float(m.outliers.max()),
     }

@@ -10,7 +10,7 @@ An equation is added here, and nowhere else.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from keras_pendulum.diagnosis.backup import Agreement, Backup, Visited, agreement
 from keras_pendulum.diagnosis.signals import Array, line_fit
-from keras_pendulum.diagnosis.states import OBSERVATION_CHANGES
+from keras_pendulum.diagnosis.states import observation_changes
 
 RIGHT = "r + γ·max Q(s′, ·)"
 _GRAVITIES = (0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0)  # m/s²
@@ -43,23 +43,51 @@ class Equation:
     flat: float = 0.0  # above 0: the advantages of Q are at most this share of the right ones
     offset: bool = False  # whether it has no next values, and Q - r is as it says
     change: dict[str, Any] | None = None  # arguments of `Visited.backup`
-    steepest: float = 1.3  # the same: the largest slope of Q over r
     label: str = ""  # what differs from the declared task
 
-    def explains(self, own: Agreement, right: Agreement, declared: Backup) -> bool:
-        """Returns whether the network obeys this equation clearly better than the right one."""
+    def explains(self, own: Agreement, right: Agreement, ends: bool = False) -> bool:
+        """Returns whether the network obeys this equation clearly better than the right one.
+
+        `ends` says whether episodes of the task terminate.
+        """
+        if ends and not self.offset and not self.flat:
+            return self._explains_ends(own, right)
         if own.error > min(self.largest_error, self.share * right.error):
             return False
         if self.offset:
-            return 0.6 < line_fit(declared.q, declared.reward).slope < self.steepest
-        if self.change is None and not 0.7 < own.position < 1.35:
+            return True
+        if self.change is None and not 0.8 < own.position < 1.35:
             return False
         if self.flat == np.inf:
             return True
         if self.flat:
             # A negative correlation is that of reversed torques.
             return own.advantages <= self.flat and -0.3 < right.correlation < 0.65
-        return own.correlation > 0.3 or own.error < 0.03
+        return own.correlation > (0.4 if self.variant else 0.3) or own.error < 0.03
+
+    def _explains_ends(self, own: Agreement, right: Agreement) -> bool:
+        """Returns the same for a task whose episodes terminate: its values show more."""
+        error, share, correlation = _LIMITS_WITH_ENDS.get(self.name, (0.2, 0.5, 0.8))
+        if own.error > min(error, share * right.error) or own.correlation < correlation:
+            return False
+        if self.name == "missing-end":
+            return own.at_ends > 0.9
+        if self.name == "torque-map":
+            return right.correlation < -0.6
+        if self.name == "observation-map":
+            return right.correlation < 0.5
+        return True
+
+
+# The largest error, its share of the right equation's error, and the least correlation.
+_LIMITS_WITH_ENDS = {
+    "other-discount": (0.3, 0.4, 0.8),
+    "reward-scale": (0.3, 0.35, 0.8),
+    "reward-sign": (0.3, 0.5, 0.8),
+    "torque-map": (0.4, 0.6, 0.8),
+    "observation-map": (0.3, 0.5, 0.6),
+    "missing-end": (0.25, 0.5, -1.0),
+}
 
 
 def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, Equation]]:
@@ -69,7 +97,8 @@ def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, 
         visited: the network.
         declared: its values for the declared task.
     """
-    offsets = (each for each in _offsets(declared) if each.offset)
+    ends = not visited.dynamics.task.never_terminates
+    offsets = (each for each in (_small_offsets if ends else _offsets)(declared) if each.offset)
     for equation in (*EQUATIONS, *offsets, *_changes(visited, declared)):
         values = visited.backup(**equation.change) if equation.change else declared
         yield agreement(values, equation.target(values)), equation
@@ -77,7 +106,7 @@ def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, 
 
 def _next(values: Callable[[Array], Array]) -> Callable[[Backup], Array]:
     """Returns a target: r + γ · these of the next values."""
-    return lambda b: b.reward + b.discount * values(b.next_q)
+    return lambda b: b.reward + b.future * values(b.next_q)
 
 
 _TARGET = "Its fixed point has other values, so the greedy policy follows another task."
@@ -120,13 +149,19 @@ EQUATIONS = (
         "wrong-target",
         "same-state",
         "r + γ·max Q(s, ·)",
-        lambda b: b.reward + b.discount * b.q.max(axis=1, keepdims=True),
+        lambda b: b.reward + b.future * b.q.max(axis=1, keepdims=True),
         "The target takes the values of the state itself, so no action has a consequence. The next "
         "state is stored as the state, or the variable is set too early.",
         "Store (s, a, r, s′) before s = s′, and copy the observation where the environment changes "
         "it in place.",
         share=0.2,
         flat=0.3,
+    ),
+    Equation(
+        "missing-end",
+        "",
+        "r + γ·max Q(s′, ·), also at an end",
+        lambda b: b.reward + b.discount * b.next_q.max(axis=2),
     ),
     Equation(
         "wrong-loss",
@@ -151,36 +186,38 @@ EQUATIONS = (
         "Compare only the output of the stored action: take Q(s, a) by gather or a mask.",
         flat=0.06,
     ),
-    Equation(
-        "misaligned-transitions",
-        "",
-        "mean over a of r + γ·max Q(s′, ·)",
-        lambda b: b.right.mean(axis=1, keepdims=True) + 0 * b.q,
-        largest_error=0.1,
-        share=0.72,
-        flat=0.4,
-    ),
 )
 
 
 def _offsets(declared: Backup) -> Iterator[Equation]:
     """Yields the equations in which a constant takes the place of the next values."""
-
-    def constant(b: Backup) -> Array:
-        return b.reward + b.offset.mean()
-
     offset, last = declared.offset, declared.q.shape[1] - 1
     mean = float(offset.mean())
-    frozen = bool(declared.offset_is_smooth and offset.std() > 0.06 and -0.1 < mean < 2)
-    indices = float(np.mean((offset > -0.3) & (offset < last))) > 0.8
-    yield Equation(
-        "no-bootstrapping",
-        "",
-        "r",
-        lambda b: b.reward,
-        share=0.2,
-        offset=not frozen and abs(mean) < 0.1,
-    )
+    small = 0.06 < offset.std() < 0.25 * declared.q.std()
+    frozen = bool(small and declared.offset_is_smooth and -0.1 < mean < 2)
+    line = line_fit(declared.q, declared.reward)
+    usual = 0.6 < line.slope < 1.3
+    # No reward is positive, so no other target adds positive numbers that differ.
+    indices = bool(np.mean((offset > -2) & (offset < declared.discount * last + 1)) > 0.8)
+    rewards = line.correlation > 0.7 and 0.45 < line.slope < 1.8
+    indices = indices and (rewards or float(declared.q.mean()) > 1)
+    indices = indices and not frozen and mean > 0.3 and float(offset.std()) > 0.2
+    found = {
+        "no-bootstrapping": usual and not frozen and abs(mean) < 0.1,
+        "frozen-target": usual and frozen,
+        "batch-max": usual and not frozen and not indices and abs(mean) >= 0.1,
+        "index-for-value": indices,
+    }
+    for equation in _offset_equations(declared):
+        yield replace(equation, offset=found[equation.variant or equation.name])
+
+
+def _offset_equations(declared: Backup) -> Iterator[Equation]:
+    def constant(b: Backup) -> Array:
+        return b.reward + b.offset.mean() * b.continues
+
+    last = declared.q.shape[1] - 1
+    yield Equation("no-bootstrapping", "", "r", lambda b: b.reward, share=0.2)
     yield Equation(
         "wrong-target",
         "frozen-target",
@@ -191,7 +228,6 @@ def _offsets(declared: Backup) -> Iterator[Equation]:
         "Copy the online weights into the target network, every 100 to 1000 updates or a little at "
         "each one.",
         share=0.2,
-        offset=frozen,
     )
     yield Equation(
         "wrong-target",
@@ -203,7 +239,6 @@ def _offsets(declared: Backup) -> Iterator[Equation]:
         "Give the maximum its axis: max(axis=1) of [B, A] is [B].",
         largest_error=0.1,
         share=0.2,
-        offset=not frozen and abs(mean) >= 0.1,
     )
     yield Equation(
         "wrong-target",
@@ -213,10 +248,31 @@ def _offsets(declared: Backup) -> Iterator[Equation]:
         "The values are the rewards of one step plus numbers between 0 and A - 1. The target adds "
         "the index of the best next action, which argmax returns, and not its value.",
         "Use max in the target; argmax is for acting.",
-        largest_error=0.9,
-        offset=indices and mean > max(0.5, 0.15 * last),
-        steepest=1.8,
+        largest_error=1.2,
     )
+
+
+def _small_offsets(declared: Backup) -> Iterator[Equation]:
+    """Yields the same for a task whose reward is constant: then Q - r alone shows them."""
+    offset, last = declared.offset, declared.q.shape[1] - 1
+    mean, spread = float(offset.mean()), float(offset.std())
+    size = float(np.abs(declared.reward).mean())
+    end = float(declared.q[~declared.continues].mean()) if not declared.continues.all() else size
+    none = abs(mean) < 0.03 * size and spread < 0.05 * size
+    small = (
+        not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
+    )
+    index = small and mean > 0 and not declared.offset_is_smooth
+    for equation in _offset_equations(declared):
+        offsets = {
+            "no-bootstrapping": none,
+            "frozen-target": small and not index,
+            "index-for-value": index,
+            "batch-max": mean > 2 * size and spread < 0.12 * mean and end < 0.5 * mean,
+        }
+        yield replace(
+            equation, offset=offsets[equation.variant or equation.name], largest_error=1.2
+        )
 
 
 def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
@@ -224,7 +280,7 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
     factor = declared.reward_factor
     if factor < -0.2 or not 0.2 < factor < 2.5:
         yield Equation(
-            "reward-sign" if factor < 0 else "reward-scale",
+            "reward-sign" if factor < -0.05 else "reward-scale",
             "",
             f"{factor:.3g}·r + γ·max Q(s′, ·)",
             lambda b: b.right + (factor - 1) * b.reward,
@@ -244,17 +300,21 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
     error = declared.q - declared.right
     # Values that are above their targets everywhere are still falling, from about 0.
     falling = error.mean() > 0.7 * np.sqrt(np.mean(error**2))
+    own = visited.dynamics.task.gravity
     for gravity in () if falling else _GRAVITIES:
-        if abs(gravity - visited.gravity) > 0.3 * visited.gravity:
-            yield _changed("other-gravity", f"g = {gravity:g}", gravity=gravity)
+        if own is not None and abs(gravity - own) > 0.3 * own:
+            task = visited.dynamics.task.with_gravity(gravity)
+            yield _changed("other-gravity", f"g = {gravity:g}", task=task)
     # The sign of the correlation is the main evidence.
-    yield _changed("torque-map", "torques reversed", share=0.95, torques=-visited.torques)
-    for name in OBSERVATION_CHANGES:
+    yield _changed(
+        "torque-map", f"{visited.dynamics.effort}s reversed", share=0.95, efforts=-visited.efforts
+    )
+    for name in observation_changes(visited.dynamics):
         yield _changed("observation-map", name, observation=name)
 
 
 def _discounted(discount: float, values: Backup) -> Array:
-    return values.reward + discount * values.next_q.max(axis=2)
+    return values.reward + discount * values.continues * values.next_q.max(axis=2)
 
 
 def _changed(name: str, label: str, share: float = 0.75, **change: Any) -> Equation:

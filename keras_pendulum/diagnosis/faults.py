@@ -28,8 +28,8 @@ _TRACES = (
 )
 FAULTS: dict[str, Fault] = {
     "bounded-output": Fault(
-        "The last layer has an activation whose bounds exclude the values. All returns of the "
-        "pendulum are negative, and most are far below -1.",
+        "The last layer has an activation whose bounds exclude the values. Most returns are far "
+        "outside of -1 to 1.",
         "Remove the activation of the last layer: Q-values need a linear head.",
         (*_TRACES, "broken-network"),
     ),
@@ -46,18 +46,36 @@ FAULTS: dict[str, Fault] = {
         "network that is copied.",
         _TRACES,
     ),
+    "missing-end": Fault(
+        "The target adds γ·max Q(next) after the end of an episode, too. So a fall costs nothing, "
+        "and all states have nearly the same value.",
+        "Multiply γ·max Q(next) by 1 - terminated.",
+        (*_TRACES, "broken-network", "not-converged"),
+    ),
+    "truncation-as-end": Fault(
+        "A truncated episode is stored as one that ended. So the target of its last step has no "
+        "γ·max Q(next), and states of long episodes get low values.",
+        "Store `terminated` alone as the end: `terminated or truncated` only ends the loop.",
+    ),
     "reward-sign": Fault(
-        "The learned values are high where the exact values are low. The agent learned to collect "
-        "costs.",
-        "Check the sign of the reward where it is stored: the pendulum's reward is never positive.",
+        "The learned values are high where the exact values are low. So the agent learned to do "
+        "what costs most.",
+        "Check the sign of the reward where it is stored: the pendulum's reward is never positive, "
+        "that of CartPole is 1.",
         ("observation-map", "overestimation"),
     ),
     "no-bootstrapping": Fault(
-        "The values are the rewards of one step. The agent does not look ahead, so it cannot swing "
-        "the pendulum up.",
-        "Add γ·max Q(next) to each target. The pendulum never terminates. Truncation is not an "
-        "end. If all of this is there, copy the online weights into the target network.",
+        "The values are the rewards of one step. The agent does not look ahead, so it cannot "
+        "prepare what pays later.",
+        "Add γ·max Q(next) to each target whose step did not terminate the episode. Truncation is "
+        "not an end. If all of this is there, copy the online weights into the target network.",
         ("too-few-updates", "reward-scale", "other-discount"),
+    ),
+    "other-reward": Fault(
+        "The recorded rewards are not those of the environment. So the agent learned another task.",
+        "Remove the wrapper that changes the reward, or check that its best policy is good here, "
+        "too.",
+        ("reward-scale", "no-bootstrapping", "other-discount"),
     ),
     "other-discount": Fault(
         "The values fit another discount much better than the declared one. The agent looks ahead "
@@ -80,27 +98,27 @@ FAULTS: dict[str, Fault] = {
     "observation-map": Fault(
         "The values fit the exact ones as soon as the observation is changed. So the agent sees "
         "another observation when it acts than when it learned.",
-        "Give the agent [cos θ, sin θ, θ̇] in this order, with θ̇ in rad/s, in training and after.",
+        "Give the agent the observation as the environment has it, in training and after: "
+        "[cos θ, sin θ, θ̇] or [x, ẋ, θ, θ̇] in this order, with m, m/s, rad and rad/s.",
         ("too-few-updates", "narrow-starts", "other-gravity", "other-discount", "overestimation"),
     ),
     "torque-map": Fault(
-        "The values are right, but each output behaves like another torque than the one it stands "
-        "for. So an index means another torque when acting than when learning.",
-        "Use one table from index to torque for acting and for storing; store the index itself.",
+        "The values are right, but each output behaves like another action than the one it stands "
+        "for. So an index means another action when acting than when learning.",
+        "Use one table from index to action for acting and for storing; store the index itself.",
         ("overestimation",),
     ),
     "too-few-updates": Fault(
         "The values are nearly as small as the initial ones. Each update carries a reward back by "
-        "one step, so the values of the swing-up need thousands of updates.",
+        "one step, so values that look far ahead need thousands of updates.",
         "Make more updates for each step of the environment, up to one for each step.",
         ("narrow-starts",),
     ),
     "misaligned-transitions": Fault(
-        "The advantages are uncorrelated with the torque, or a stored transition is one that the "
-        "pendulum cannot make. So observation, action, reward and next observation are of "
-        "different steps.",
+        "Stored transitions are some that the task cannot make. So observation, action, reward and "
+        "next observation are of different steps.",
         "Store (s, a, r, s') of one step; copy the observation before the environment changes it.",
-        ("too-few-updates",),
+        ("too-few-updates", "missing-end", "truncation-as-end"),
     ),
     "broken-network": Fault(
         "The outputs are not numbers, have no sensible size, or are the same for all actions. Such "
@@ -120,14 +138,13 @@ FAULTS: dict[str, Fault] = {
         "Use a target network, double Q-learning and a replay buffer of many episodes.",
     ),
     "narrow-starts": Fault(
-        "The values are right in a part of the phase plane and wrong in the rest. The agent was "
-        "never in the rest.",
-        "Start the episodes in all parts of the plane, and make them long enough to leave the "
-        "start.",
+        "The values are right in a part of the states and wrong in the rest. The agent was never "
+        "in the rest.",
+        "Start the episodes in all parts of them, and make them long enough to leave the start.",
     ),
     "forgetting": Fault(
-        "The replay buffer holds only the last episodes. The network forgets the way up when no "
-        "stored transition shows it.",
+        "The replay buffer holds only the last episodes. The network forgets what no stored "
+        "transition shows.",
         "Make the replay buffer larger: it should hold at least 14 000 transitions.",
     ),
     "exploration": Fault(
@@ -170,6 +187,7 @@ class Finding:
     repair: Repair | None = None  #: the repair without training, where there is one
     variant: str = ""  #: which target, loss or head, such as `mean-next`
     text: Fault | None = None  #: of the variant
+    proven: bool = False  #: whether stored actions show it, without a repair
 
     @property
     def title(self) -> str:

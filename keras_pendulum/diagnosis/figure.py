@@ -52,7 +52,10 @@ def draw_diagnosis(
         (values, outputs), (torques, last) = figure.subplots(2, 2)
         _draw_values(values, measurement)
         _draw_outputs(outputs, measurement)
-        _draw_torques(torques, measurement)
+        if measurement.dynamics.any_effort:
+            _draw_torques(torques, measurement)
+        else:
+            _draw_differences(torques, measurement)
         if repairs:
             _draw_repairs(last, measurement, repairs)
         else:
@@ -93,14 +96,28 @@ def _draw_outputs(axes: Axes, measurement: Measurement) -> None:
 
 
 def _draw_torques(axes: Axes, measurement: Measurement) -> None:
-    torques = measurement.torques
+    torques = measurement.efforts
     limit = 4.0  # N·m; a network that has learned little has no torques to speak of
-    found = np.clip(measurement.output_torques, -limit, limit)
+    found = np.clip(measurement.output_efforts, -limit, limit)
     axes.plot(torques, torques, color=_HEALTHY, linewidth=6, label="healthy")
     axes.plot(torques, found, "o", markersize=3, color=_OWN, label="own")
     axes.set(xlabel="Torque of the output (N·m)", ylabel="Torque it behaves like (N·m)")
     axes.set(xlim=(-2.2, 2.2), ylim=(-limit - 0.2, limit + 0.2))
     axes.set_title("Torque of each output")
+    axes.legend(frameon=False)
+
+
+def _draw_differences(axes: Axes, measurement: Measurement) -> None:
+    """Draws how much better the last action is than the first, in each state."""
+    exact, learned = (q[:, -1] - q[:, 0] for q in (measurement.exact_q, measurement.learned_q))
+    # A difference says most where it is large, and those are few: the axes show 98 % of them.
+    limit = 1.1 * max(float(np.quantile(np.abs(exact), 0.98)), 1e-6)
+    axes.plot([-limit, limit], [-limit, limit], color=_HEALTHY, linewidth=6, label="healthy")
+    points = np.clip(exact, -limit, limit), np.clip(learned, -limit, limit)
+    axes.plot(*points, ".", markersize=2, color=_OWN, label="own")
+    axes.set(xlabel="Exact Q(s, right) - Q(s, left)", ylabel="Learned difference")
+    axes.set(xlim=(-limit, limit), ylim=(-limit, limit))
+    axes.set_title("Difference of the actions in each state")
     axes.legend(frameon=False)
 
 

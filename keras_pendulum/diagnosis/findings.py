@@ -13,14 +13,17 @@ from keras_pendulum.diagnosis import (
     acting_rules,
     equation_rules,
     output_rules,
+    run_rules,
     training_rules,
+    transition_rules,
 )
 from keras_pendulum.diagnosis.faults import FAULTS, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 
 RULES: tuple[Callable[[Measurement], Finding | None], ...] = (
     output_rules.not_finite,
-    training_rules.stored_transitions,
+    transition_rules.stored_transitions,
+    run_rules.old_state,
     output_rules.bounded_output,
     output_rules.batch_broadcast,
     output_rules.same_everywhere,
@@ -32,15 +35,16 @@ RULES: tuple[Callable[[Measurement], Finding | None], ...] = (
     training_rules.stored_rewards,
     training_rules.too_few_updates,
     training_rules.learning_rate,
-    training_rules.exploration,
+    run_rules.exploration,
     training_rules.overestimation,
-    training_rules.forgetting,
-    training_rules.narrow_starts,
+    transition_rules.forgetting,
+    run_rules.narrow_starts,
     training_rules.saturated_layer,
+    transition_rules.truncation_as_end,
 )
 
 
-_SHOWN_BY_REPAIR = ("torque-map", "observation-map")  # without the record of the run
+_SHOWN_BY_REPAIR = ("torque-map", "observation-map")  # unless stored actions prove them
 
 
 def find(measurement: Measurement) -> list[Finding]:
@@ -59,9 +63,24 @@ def find(measurement: Measurement) -> list[Finding]:
     for name, fault in FAULTS.items():
         if name in found:
             found = {other: each for other, each in found.items() if other not in fault.explains}
-    if not found and (finding := equation_rules.not_converged(measurement)):
-        found[finding.name] = finding
+    if not found:
+        finding = run_rules.unsteady_return(measurement)
+        if finding := finding or equation_rules.not_converged(measurement):
+            found[finding.name] = finding
     return list(found.values())
+
+
+def find_in_record(measurement: Measurement) -> list[Finding]:
+    """Returns the findings of the record alone, for an agent without Q-values."""
+    if measurement.record is None:
+        return []
+    rules = (
+        transition_rules.stored_transitions,
+        run_rules.old_state,
+        run_rules.narrow_starts,
+        transition_rules.truncation_as_end,
+    )
+    return [finding for rule in rules if (finding := rule(measurement)) is not None]
 
 
 def _with_working_repair(m: Measurement, finding: Finding | None) -> Finding | None:
@@ -69,6 +88,6 @@ def _with_working_repair(m: Measurement, finding: Finding | None) -> Finding | N
         return finding
     if finding.repair.won >= 0.5 * m.avoidable_regret:
         return finding
-    if m.record is None and finding.name in _SHOWN_BY_REPAIR:
+    if not finding.proven and finding.name in _SHOWN_BY_REPAIR:
         return None
     return replace(finding, repair=None)

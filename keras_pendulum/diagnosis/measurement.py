@@ -10,30 +10,27 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.diagnosis import signals
 from keras_pendulum.diagnosis.backup import Agreement, Backup, Visited, agreement
 from keras_pendulum.diagnosis.equations import RIGHT, Equation, agreements
+from keras_pendulum.diagnosis.motion import Motion, motion_kind
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array, Fit
 from keras_pendulum.diagnosis.states import (
     Act,
     Episodes,
-    observe,
     simulate,
     training_states,
     visited_states,
 )
 from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
-from keras_pendulum.environments.actions import TorqueActions
-from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
+from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.policy import Observations, Policy
 from keras_pendulum.evaluate.q_policies import DQNPolicy
-from keras_pendulum.optimum.discounted import discounted_value, exact_q
-from keras_pendulum.optimum.optimal_return import discounted_return, optimal_return
+from keras_pendulum.optimum.known_dynamics import KnownDynamics, Table
 from keras_pendulum.optimum.solutions import solution
 
 STARTS = 60  # seeds 0, 1, …
@@ -51,19 +48,34 @@ class Measurement:
     """
 
     policy: Policy
-    task: Pendulum
+    task: Task  # whose dynamics are known
     discount: float  # γ
     reward_scale: float = 1.0  # declared factor on the rewards
     record: RunRecord | None = None  # of the run that trained the policy
     start_count: int = STARTS
     on_episodes: Callable[[int], None] = _nothing  # called when so many are played
 
+    @cached_property
+    def dynamics(self) -> KnownDynamics:
+        """The dynamics of the task, and its exact values."""
+        found = solution(self.task)
+        assert isinstance(found, KnownDynamics)
+        return found
+
     @property
-    def torques(self) -> Array:
-        """The torques [A] of the outputs in N·m."""
-        actions = self.policy.actions
-        assert isinstance(actions, TorqueActions)
-        return actions.torques
+    def efforts(self) -> Array:
+        """The efforts [A] of the outputs in N·m or N; without outputs, those of the record."""
+        if self.policy.actions is not None:
+            return self.dynamics.all_efforts(self.policy.actions)
+        assert self.record is not None and self.record.own_efforts is not None
+        return self.record.own_efforts
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion of the record's transitions."""
+        assert self.record is not None
+        kind, stored = motion_kind(self.dynamics), self.record.stored_efforts(self.efforts)
+        return kind(self.dynamics, self.record.replay, stored, self.efforts)
 
     def without_code(self) -> Measurement:
         """Returns a copy whose policy has no part that pickle refuses, such as a local function."""
@@ -80,10 +92,10 @@ class Measurement:
         return copied
 
     def act(self, observations: Observations) -> Array:
-        """Returns the torques [B] in N·m."""
+        """Returns the efforts [B] in N·m or N."""
         if self.policy.has_q_values and not self.finite:
-            return self.torques[self.q_values(observations).argmax(axis=1)]
-        return np.asarray(self.policy.act(observations)[:, 0])
+            return self.efforts[self.q_values(observations).argmax(axis=1)]
+        return self.dynamics.efforts(self.policy.act(observations))
 
     def play(self, act: Act) -> Episodes:
         """Returns the episodes of a policy from the starts.
@@ -95,11 +107,12 @@ class Measurement:
         played = []
         for starts in parts:
             self.policy.reset()
-            played.append(simulate(act, self.task.gravity, starts))
+            played.append(simulate(act, self.dynamics, starts))
             self.on_episodes(len(starts))
         return Episodes(
             np.concatenate([each.states for each in played], axis=1),
             np.concatenate([each.rewards for each in played], axis=1),
+            np.concatenate([each.playing for each in played], axis=1),
         )
 
     def q_values(self, observations: Observations) -> Array:
@@ -111,12 +124,13 @@ class Measurement:
     @property
     def settings(self) -> Mapping[str, Any]:
         """The settings of the run, as far as they are known."""
-        return self.policy.info.settings if self.record is None else asdict(self.record.config)
+        config = None if self.record is None else self.record.config
+        return self.policy.info.settings if config is None else asdict(config)
 
     @property
     def updates(self) -> int | None:
         """The number of updates of the run, as its record or its settings have it, else None."""
-        if self.record is not None:
+        if self.record is not None and self.record.updates is not None:
             return self.record.updates
         try:
             return Config(**self.settings).total_updates if self.settings else None
@@ -125,8 +139,8 @@ class Measurement:
 
     @cached_property
     def starts(self) -> Array:
-        """The starts [B, 2] of the episodes."""
-        return pendulum_starts(range(self.start_count))
+        """The starts [B, S] of the episodes."""
+        return self.dynamics.starts(range(self.start_count))
 
     @cached_property
     def episodes(self) -> Episodes:
@@ -134,20 +148,19 @@ class Measurement:
         return self.play(self.act)
 
     @cached_property
-    def first_torques(self) -> Array:
-        """The torques [B] at the starts, in N·m."""
-        return self.act(observe(self.starts))
+    def first_efforts(self) -> Array:
+        """The efforts [B] at the starts."""
+        return self.act(self.dynamics.observe(self.starts))
 
     @cached_property
     def optimum(self) -> float:
         """The mean optimal return of the starts."""
-        return float(optimal_return(self.task.gravity, range(self.start_count)).mean())
+        return float(self.dynamics.best_returns(range(self.start_count)).mean())
 
     @cached_property
     def discount_cost(self) -> float:
         """The regret of the exact policy for the declared discount."""
-        returns = discounted_return(self.task.gravity, self.discount, range(self.start_count))
-        return max(0.0, self.optimum - float(returns.mean()))
+        return self.dynamics.discount_cost(self.discount, range(self.start_count)) or 0.0
 
     @cached_property
     def regret(self) -> float:
@@ -161,29 +174,28 @@ class Measurement:
 
     @cached_property
     def regret_tolerance(self) -> float:
-        """The regret that needs no finding: 1 % of the way from random torques to the optimum.
+        """The regret that needs no finding: 1 % of the way from random actions to the optimum.
 
         What the discount costs comes on top, because no training can win it back.
         """
-        way = self.optimum - solution(self.task).random_return()
+        way = self.optimum - self.dynamics.random_return()
         return 0.01 * max(way, 1.0) + self.discount_cost
 
     @cached_property
-    def table(self) -> NDArray[np.float32]:
-        """V of the declared task, as `discounted_value` returns it."""
-        return discounted_value(self.task.gravity, self.discount)
+    def table(self) -> Table:
+        """V of the declared task."""
+        return self.dynamics.table(self.discount)
 
     @cached_property
     def states(self) -> Array:
-        """States [N, 2] that a run of this task meets."""
-        return training_states(self.table, self.task.gravity, self.discount, self.starts)
+        """States [N, S] that a run of this task meets."""
+        return training_states(self.table, self.dynamics, self.discount, self.starts)
 
     @cached_property
     def visited(self) -> Visited:
-        """The network at the states that it visits itself, with random torques."""
-        gravity, torques = self.task.gravity, self.torques
-        states = visited_states(self.q_values, torques, gravity, self.starts)
-        return Visited(self.q_values, states, torques, gravity, self.discount)
+        """The network at the states that it visits itself, with random actions."""
+        states = visited_states(self.q_values, self.efforts, self.dynamics, self.starts)
+        return Visited(self.q_values, states, self.efforts, self.dynamics, self.discount)
 
     @cached_property
     def backup(self) -> Backup:
@@ -216,16 +228,12 @@ class Measurement:
     @cached_property
     def learned_q(self) -> Array:
         """The learned Q-values [N, A] at `states`."""
-        return self.q_values(observe(self.states))
+        return self.q_values(self.dynamics.observe(self.states))
 
     @cached_property
     def exact_q(self) -> Array:
         """The exact Q-values [N, A] at `states`."""
-        return self._exact_q(self.states)
-
-    def _exact_q(self, states: Array) -> Array:
-        theta, speed = states.T
-        return exact_q(self.table, self.task.gravity, self.discount, theta, speed, self.torques)
+        return self.dynamics.exact_q(self.table, self.discount, self.states, self.efforts)
 
     @cached_property
     def finite(self) -> bool:
@@ -249,9 +257,9 @@ class Measurement:
         return float(signals.advantages(self.learned_q).std() / max(exact, 1e-12))
 
     @cached_property
-    def output_torques(self) -> Array:
-        """The torque [A] that each output behaves like, in N·m."""
-        found = signals.output_torques(self.learned_q, self.exact_q, self.torques)
+    def output_efforts(self) -> Array:
+        """The effort [A] that each output behaves like."""
+        found = signals.output_efforts(self.learned_q, self.exact_q, self.efforts)
         return found / (self.value.slope or 1.0)
 
     @cached_property
@@ -272,9 +280,10 @@ class Measurement:
         The states are those of the first half of the agent's episodes.
         """
         episodes, half = self.episodes, len(self.episodes.rewards) // 2
-        collected = episodes.returns_to_go(self.discount)[:half:5]
-        learned = self.q_values(observe(episodes.states[:half:5].reshape(-1, 2)))
-        return float(np.median(learned.max(axis=1) - collected.ravel())) / self.value_spread
+        playing = episodes.playing[:half:5]
+        collected = episodes.returns_to_go(self.discount)[:half:5][playing]
+        learned = self.q_values(self.dynamics.observe(episodes.states[:half:5][playing]))
+        return float(np.median(learned.max(axis=1) - collected)) / self.value_spread
 
     @cached_property
     def value_spread(self) -> float:
@@ -292,7 +301,7 @@ class Measurement:
             return 0.0, 0.0
         weights = policy.weights
         names = activations_of(policy.activation, len(weights) // 2 - 1)
-        saturated, dead, features = [0.0], [0.0], observe(self.states)
+        saturated, dead, features = [0.0], [0.0], self.dynamics.observe(self.states)
         for kernel, bias, name in zip(weights[:-2:2], weights[1:-2:2], names, strict=True):
             features = ACTIVATIONS[name](features @ kernel + bias)
             if name == "tanh":

@@ -21,11 +21,13 @@ def not_finite(m: Measurement) -> Finding | None:
     if not m.finite:
         return Finding("broken-network", "Q-values that are not finite", "all finite")
     largest = float(np.abs(m.learned_q).max())
-    limit = _WORST_REWARD / max(1 - m.discount, 0.005)
+    worst, best = m.task.reward_range
+    limit = max(-worst, best) / max(1 - m.discount, 0.005)
     if largest > 1e5 * limit:
         if m.learned_q.mean() > m.learned_q.std():
-            evidence = f"values of {m.learned_q.mean():.1e}, though no reward is positive"
-            return Finding("overestimation", evidence, "at most 0")
+            highest = best / max(1 - m.discount, 0.005)
+            evidence = f"values of {m.learned_q.mean():.1e}, and the highest possible is "
+            return Finding("overestimation", f"{evidence}{highest:.0f}", f"at most {highest:.0f}")
         return Finding("broken-network", f"values up to {largest:.1e}", f"at most {limit:.0f}")
     return None
 
@@ -34,6 +36,8 @@ def bounded_output(m: Measurement) -> Finding | None:
     """Finds the traces of an activation after the last layer."""
     if isinstance(m.policy, DQNPolicy):  # its head is linear
         return None
+    if not m.task.never_terminates:
+        return _bounded_everywhere(m)
     outputs = m.learned_q * m.reward_scale
     low, high = float(outputs.min()), float(outputs.max())
     sums = outputs.sum(axis=1)
@@ -62,6 +66,30 @@ def bounded_output(m: Measurement) -> Finding | None:
     return Finding("bounded-output", evidence, "no bound", variant=variant, text=text)
 
 
+def _bounded_everywhere(m: Measurement) -> Finding | None:
+    """Finds bounds where the values of the task are positive: far away, a linear head has none."""
+    random = np.random.RandomState(0)
+    far = random.normal(scale=1000, size=(200, m.task.observation_size)).astype(np.float32)
+    outputs = np.concatenate([m.q_values(far), m.learned_q]) * m.reward_scale
+    low, high = float(outputs.min()), float(outputs.max())
+    if low >= 0 and np.abs(outputs.sum(axis=1) - 1).max() < 1e-3:
+        variant, bounds = "softmax", "from 0 to 1, and their sum is 1"
+    elif np.ptp(outputs) < 1e-3 and 0.999 < high <= 1:
+        variant, bounds = "tanh or sigmoid", "1, also far outside of the task"
+    elif 0 <= low < 0.1 and 0.9 < high <= 1:
+        variant, bounds = "sigmoid", "from 0 to 1, also far outside of the task"
+    elif -1 <= low < 0 and 0.9 < high <= 1:
+        variant, bounds = "tanh", "from -1 to 1, also far outside of the task"
+    else:
+        return None
+    text = Fault(
+        f"The last layer ends with {variant}, which cannot give these values. A pole that does not "
+        f"fall has a value of {m.exact_q.max():.0f}.",
+        f"Remove {variant} from the last layer: Q-values need a linear head.",
+    )
+    return Finding("bounded-output", f"all values are {bounds}", "no bound", None, variant, text)
+
+
 def same_everywhere(m: Measurement) -> Finding | None:
     """Finds values that are the same for all states or for all actions."""
     largest = float(np.abs(m.learned_q).max())
@@ -87,7 +115,13 @@ def batch_broadcast(m: Measurement) -> Finding | None:
     reward = mean * (1 - m.discount)  # of a step, if this value is the mean target
     if not values.std(axis=0).any() or max(m.units) > 0.99:  # a dead network
         return None
-    if spread > 0.3 * m.backup.reward.std() or not 0.02 < reward / -_WORST_REWARD < 0.9:
+    if m.task.never_terminates:
+        own = spread < 0.3 * m.backup.reward.std() and 0.02 < reward / -_WORST_REWARD < 0.9
+        rewards = f"the rewards by {m.backup.reward.std():.2g}"
+    else:  # of the constant reward 1
+        own = spread < 0.02 * mean and mean > 1.5 and reward < 0.8
+        rewards = "and are neither 1 nor those of a pole that never falls"
+    if not own:
         return None
     text = Fault(
         "Every value is the mean of all targets, so the loss compares each value with the targets "
@@ -97,8 +131,7 @@ def batch_broadcast(m: Measurement) -> Finding | None:
     )
     return Finding(
         "wrong-loss",
-        f"values of {mean:.0f} in all states: they differ by {spread:.2g}, the rewards by "
-        f"{m.backup.reward.std():.2g}",
+        f"values of {mean:.0f} in all states: they differ by {spread:.2g}, {rewards}",
         f"a difference of {m.value_spread:.0f}",
         variant="batch-broadcast",
         text=text,
@@ -107,6 +140,8 @@ def batch_broadcast(m: Measurement) -> Finding | None:
 
 def reward_size(m: Measurement) -> Finding | None:
     """Finds values beyond the lowest possible one, or lost in the noise of the weights."""
+    if not m.task.never_terminates:
+        return None  # its equation shows it
     lowest = -_WORST_REWARD / max(1 - m.discount, 0.005)
     mean = float(m.learned_q.mean())
     if mean < lowest:

@@ -10,45 +10,48 @@ import numpy as np
 from keras_pendulum.diagnosis.faults import Finding, Repair
 from keras_pendulum.diagnosis.measurement import STARTS, Measurement
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.diagnosis.states import OBSERVATION_CHANGES, Act
+from keras_pendulum.diagnosis.states import Act, observation_changes
 
 LIKELY_CHANGES = (
     "cos θ, sin θ, -θ̇",
     "sin θ, cos θ, θ̇",
     "-cos θ, sin θ, θ̇",
     "cos θ, sin θ, θ̇·π/180",
+    "θ, θ̇, x, ẋ",
+    "x, θ, ẋ, θ̇",
+    "x, ẋ, θ·180/π, θ̇·180/π",
 )
 
 
-_FACTORS = {"torque reversed": -1.0, "half the torque": 0.5, "double the torque": 2.0}
+_FACTORS = {"half the torque": 0.5, "double the torque": 2.0}
 _FEW_STARTS = 6  # to choose the change of the observation that is played on all
 
 
-def change_torques(m: Measurement, torques: Array, name: str) -> Repair:
-    """Plays the agent with other torques [A] for its outputs."""
-    return _play(m, name, lambda observations: torques[m.q_values(observations).argmax(axis=1)])
+def change_efforts(m: Measurement, efforts: Array, name: str) -> Repair:
+    """Plays the agent with other efforts [A] for its outputs."""
+    return _play(m, name, lambda observations: efforts[m.q_values(observations).argmax(axis=1)])
 
 
 def mask_outputs(m: Measurement, masked: list[int]) -> Repair:
     """Plays the agent without some outputs."""
-    used = ~np.isin(np.arange(len(m.torques)), masked)
+    used = ~np.isin(np.arange(len(m.efforts)), masked)
     return _play(
         m,
         f"without the outputs {', '.join(map(str, masked))}",
-        lambda observations: m.torques[
+        lambda observations: m.efforts[
             np.where(used, m.q_values(observations), -np.inf).argmax(axis=1)
         ],
     )
 
 
 def change_observations(m: Measurement, name: str) -> Repair:
-    """Plays the agent with a changed observation, one of `OBSERVATION_CHANGES`."""
-    change = OBSERVATION_CHANGES[name]
+    """Plays the agent with a changed observation, one of `observation_changes`."""
+    change = observation_changes(m.dynamics)[name]
     return _play(m, f"observation [{name}]", lambda observations: m.act(observations @ change))
 
 
-def _scale_torques(m: Measurement, name: str) -> Repair:
-    return _play(m, name, lambda observations: _FACTORS[name] * m.act(observations))
+def _scale_efforts(m: Measurement, name: str, factor: float) -> Repair:
+    return _play(m, name, lambda observations: factor * m.act(observations))
 
 
 def find_by_repairs(m: Measurement) -> list[Finding]:
@@ -56,11 +59,13 @@ def find_by_repairs(m: Measurement) -> list[Finding]:
 
     Where the policy is fast, each order and sign of the observation is tried on a few starts.
     """
-    repairs = [("torque-map", _scale_torques(m, name)) for name in _FACTORS]
-    names: Sequence[str] = LIKELY_CHANGES
+    factors = {f"{m.dynamics.effort} reversed": -1.0} | (_FACTORS if m.dynamics.any_effort else {})
+    repairs = [("torque-map", _scale_efforts(m, *item)) for item in factors.items()]
+    changes = observation_changes(m.dynamics)
+    names: Sequence[str] = [name for name in LIKELY_CHANGES if name in changes]
     if m.start_count == STARTS:
         few = replace(m, start_count=_FEW_STARTS)
-        tried = {name: change_observations(few, name).regret for name in OBSERVATION_CHANGES}
+        tried = {name: change_observations(few, name).regret for name in changes}
         names = sorted(tried, key=lambda name: tried[name])[:1]
     repairs += [("observation-map", change_observations(m, name)) for name in names]
     name, best = min(repairs, key=lambda item: item[1].regret)

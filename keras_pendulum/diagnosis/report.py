@@ -1,9 +1,10 @@
-"""The report of a diagnosis: one HTML file without links to other files."""
+"""The report of a diagnosis: one HTML file that needs no other file."""
 
 from __future__ import annotations
 
 import base64
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.diagnosis.figure import FONT_SIZE
@@ -21,7 +22,7 @@ h1 { font-size: 1.4rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
 img { max-width: 100%; height: auto; }
 @media (prefers-color-scheme: dark) {
   body { color: #e6e6e6; background: #16181c; } img { border-radius: 6px; } }
-dt { font-weight: 600; } dd { margin: 0 0 0.5rem 0; }
+a { color: inherit; } dt { font-weight: 600; } dd { margin: 0 0 0.5rem 0; }
 """
 
 
@@ -59,9 +60,17 @@ def _section(finding: Finding) -> str:
     if finding.repair is not None:
         rows["Repair without training"] = str(finding.repair)
         rows["Cost in return"] = f"{finding.repair.won:.1f}"
-    rows["Read more"] = finding.page
     items = "".join(f"<dt>{_text(name)}</dt><dd>{_text(text)}</dd>" for name, text in rows.items())
-    return f"<dl>{items}</dl>"
+    return f"<dl>{items}<dt>Read more</dt><dd>{_link(finding.page)}</dd></dl>"
+
+
+def _link(page: str) -> str:
+    """Returns a link to a page of the docs, or its name where this package is not a checkout."""
+    name, _, section = page.partition("#")
+    file = Path(__file__).parents[2] / name
+    if not file.is_file():
+        return _text(page)
+    return f'<a href="{_text(file.as_uri())}#{_text(section)}">{_text(page)}</a>'
 
 
 def _text(text: str) -> str:

@@ -1,18 +1,21 @@
-"""The record of a run folder: its history, and the fit of its transitions to the pendulum."""
+"""The record of a run: its history, its steps and its stored transitions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config
-from keras_pendulum.diagnosis.signals import Array, line_fit
+from keras_pendulum.diagnosis.played_steps import PlayedSteps
+from keras_pendulum.diagnosis.record_observations import find_change
+from keras_pendulum.diagnosis.record_sources import read_actions, steps_of, transitions_of
+from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.dqn.replay_buffer import Transitions
-from keras_pendulum.environments.pendulum import MAX_SPEED
 from keras_pendulum.history import EpisodeRecord
-from keras_pendulum.optimum.dynamics import TIME_STEP
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
 from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.storage.run_folder import RunFolder
 
@@ -26,37 +29,67 @@ def read_record(folder: RunFolder) -> RunRecord:
     return RunRecord(run.config, run.history, run.replay)
 
 
+def make_record(
+    record: Any, transitions: Any, efforts: Array | None, dynamics: KnownDynamics
+) -> RunRecord | None:
+    """Returns the record of a program of one's own, or None where it hands in neither.
+
+    Args:
+        record: a recorder, or its file.
+        transitions: the content of a replay buffer, as `transitions_of` takes it.
+        efforts: of the agent's outputs, [A]; None where it has none.
+        dynamics: the task.
+
+    Raises ConfigError for an action that is neither an index nor a torque, and the errors of
+    `steps_of` and `transitions_of`.
+    """
+    if record is None and transitions is None:
+        return None
+    played = None
+    if record is not None:
+        played = PlayedSteps.of(steps_of(record, dynamics.task), efforts, dynamics)
+    if transitions is None:
+        assert played is not None
+        stored, name = Transitions(*played.steps[:5]), "record"
+    else:
+        stored, name = transitions_of(transitions, dynamics.task), "transitions"
+    change = find_change(dynamics, stored.observation, stored.action, stored.next_observation, name)
+    stored = stored._replace(
+        observation=stored.observation @ change, next_observation=stored.next_observation @ change
+    )
+    indices, effort = read_actions(np.asarray(stored.action), efforts, name)
+    own = None
+    if efforts is None:
+        own, indices = np.unique(indices, return_inverse=True)
+    replay = stored._replace(action=np.asarray(indices, np.int32))
+    return RunRecord(None, [], replay, played, transitions is not None, effort, own)
+
+
 @dataclass(frozen=True)
 class RunRecord:
-    """The settings, the history and the stored transitions of a run."""
+    """What is known of a run: as much as a run folder, a recorder or a replay buffer shows."""
 
-    config: Config
+    config: Config | None
     history: list[EpisodeRecord]
-    replay: Transitions  # [N, ...], oldest first
+    replay: Transitions  # [N, ...], oldest first; without a buffer, all recorded steps
+    played: PlayedSteps | None = None  # of a recorder
+    is_buffer: bool = True  # whether `replay` is what the network learned from
+    effort: Array | None = None  # [N] N·m, where the actions were recorded as torques
+    own_efforts: Array | None = None  # [A] N·m of the actions, for an agent that declares none
 
     @property
-    def updates(self) -> int:
-        """The number of updates."""
-        return self.history[-1].updates if self.history else 0
+    def updates(self) -> int | None:
+        """The number of updates; None where it is unknown."""
+        return self.history[-1].updates if self.history else None
 
     @property
-    def steps(self) -> int:
-        """The number of environment steps."""
+    def steps(self) -> int | None:
+        """The number of environment steps; None where it is unknown."""
+        if self.played is not None:
+            return int(self.played.steps.total)
+        if self.config is None:
+            return None
         return self.history[-1].environment_steps if self.history else 0
-
-    @property
-    def states(self) -> Array:
-        """The stored states [N, 2], θ in rad and θ̇ in rad/s."""
-        cosine, sine, speed = self.replay.observation.astype(np.float64).T
-        return np.stack([np.arctan2(sine, cosine), speed], axis=1)
-
-    def seen_cells(self, cells: int = 8) -> float:
-        """Returns the share of the cells of the plane, up to 4 rad/s, with a stored state."""
-        theta, speed = self.states.T
-        theta, speed = theta[np.abs(speed) < 4], speed[np.abs(speed) < 4]
-        edges = [np.linspace(-np.pi, np.pi, cells + 1), np.linspace(-4, 4, cells + 1)]
-        counts, *_ = np.histogram2d(theta, speed, bins=edges)
-        return float((counts > 0).mean())
 
     @property
     def random_count(self) -> float:
@@ -64,76 +97,16 @@ class RunRecord:
         stored, expected = len(self.replay.action), 0.0
         before = [0, *(record.environment_steps for record in self.history)]
         for record, first in zip(self.history, before, strict=False):
-            steps = record.environment_steps - max(first, self.steps - stored)
+            steps = record.environment_steps - max(first, before[-1] - stored)
             expected += record.epsilon * max(0, steps)
         return expected
 
-    def motion_fit(self, torques: Array) -> tuple[float, float]:
-        """Returns the gravity that acted, and the correlation of the stored torque with that too.
-
-        Gravity and torque are those with which the equation of motion best leads from each stored
-        observation to the next one. The correlation is 1 in a healthy buffer.
-        Both are 0 where no transition is below the speed limit.
-        """
-        sine, acceleration, action = self._motion
-        if not len(action):
-            return 0.0, 0.0
-        stored = torques[action]
-        causes = np.stack([1.5 * sine, 3 * stored], axis=1)
-        (gravity, _), *_ = np.linalg.lstsq(causes, acceleration, rcond=None)
-        acted = acceleration - gravity * causes[:, 0]
-        return float(gravity), line_fit(acted, stored).correlation
-
-    def lost_actions(self, torques: Array) -> list[int]:
-        """Returns the actions that acted, but were always stored as one other action.
-
-        The equation of motion is exact, so each transition shows which torque acted in it. No
-        action is returned without 200 transitions below the speed limit, for half of the actions or
-        more, and where the torques that acted are not among `torques`.
-        """
-        sine, acceleration, stored = self._motion
-        if len(stored) < 200:
-            return []
-        gravity, _ = self.motion_fit(torques)
-        for _ in range(3):  # a lost action changes the first fit of the gravity a little
-            acted = (acceleration - 1.5 * gravity * sine) / 3
-            nearest = np.abs(acted[:, None] - torques).argmin(axis=1)
-            rest = acceleration - 3 * torques[nearest]
-            gravity = (rest * sine).sum() / max(1.5 * (sine**2).sum(), 1e-9)
-        if (np.abs(acted - torques[nearest]) < 0.01).mean() < 0.95:
-            return []
-        never_stored = set(nearest.tolist()) - set(self.replay.action.tolist())
-        lost = sorted(
-            action
-            for action in never_stored
-            if (nearest == action).sum() > 1 and np.ptp(stored[nearest == action]) == 0
-        )
-        return lost if len(lost) < len(torques) / 2 else []
+    def stored_efforts(self, efforts: Array) -> Array:
+        """Returns the stored efforts [N]; `efforts` are those of the outputs."""
+        return efforts[self.replay.action] if self.effort is None else self.effort
 
     @property
-    def _motion(self) -> tuple[Array, Array, NDArray[np.intp]]:
-        """sin θ, acceleration and stored action of the transitions below the speed limit."""
-        theta, speed = self.states.T
-        next_speed = self.replay.next_observation[:, 2].astype(np.float64)
-        free = np.abs(next_speed) < MAX_SPEED - 1e-3
-        acceleration = (next_speed - speed) / TIME_STEP
-        return np.sin(theta)[free], acceleration[free], self.replay.action[free]
-
-    def reward_fit(self, torques: Array) -> tuple[float, float]:
-        """Returns correlation and factor between the stored rewards and the exact ones.
-
-        Both are 1 in a healthy buffer, after division by the declared scale.
-        """
-        rewards = self._exact_rewards(torques)
-        fit = line_fit(self.replay.reward / self.config.reward_scale, rewards)
-        return fit.correlation, fit.slope
-
-    def shifted_reward_fit(self, torques: Array) -> float:
-        """Returns the correlation of the stored rewards with the exact ones of the step before."""
-        before = self._exact_rewards(torques)[:-1]
-        same = np.all(self.replay.observation[1:] == self.replay.next_observation[:-1], axis=1)
-        return line_fit(self.replay.reward[1:][same], before[same]).correlation
-
-    def _exact_rewards(self, torques: Array) -> Array:
-        theta, speed = self.states.T
-        return -(theta**2) - 0.1 * speed**2 - 0.001 * torques[self.replay.action] ** 2
+    def follows(self) -> NDArray[np.bool_]:
+        """Which transitions [N - 1] begin where the one before ends."""
+        replay = self.replay
+        return np.all(replay.observation[1:] == replay.next_observation[:-1], axis=1)

@@ -51,7 +51,7 @@ def advantage_fit(learned: Array, exact: Array) -> Fit:
     return line_fit(advantages(learned), advantages(exact))
 
 
-def output_torques(learned: Array, exact: Array, torques: Array) -> Array:
+def output_efforts(learned: Array, exact: Array, torques: Array) -> Array:
     """Returns the torque that each output behaves like, [A], as a multiple of one unknown scale.
 
     The exact advantage is nearly proportional to the torque: λ(s)·u. Each output's advantage is
@@ -73,3 +73,11 @@ def output_outliers(learned: Array, exact: Array) -> Array:
     distance = np.abs(error - np.median(error))
     spread = 1.48 * np.median(distance)
     return distance / max(spread, 1e-9 * (1 + np.abs(learned).max()))
+
+
+def nearest(values: Array, torques: Array) -> NDArray[np.intp]:
+    """Returns the index [N] of the torque nearest to each value [N]."""
+    order = np.argsort(torques, kind="stable")
+    ordered = torques[order]
+    found: NDArray[np.intp] = order[np.searchsorted((ordered[1:] + ordered[:-1]) / 2, values)]
+    return found

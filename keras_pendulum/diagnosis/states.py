@@ -4,36 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
-from keras_pendulum.environments.torque import MAX_TORQUE
-from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
-from keras_pendulum.optimum.value_iteration import value_at
+from keras_pendulum.optimum.known_dynamics import KnownDynamics, Table
 
-# From observations [B, 3] to torques [B] in N·m.
+# From observations [B, D] to efforts [B] in N·m or N.
 Act = Callable[[NDArray[np.float32]], Array]
 
 _STATES = 1500  # of each other kind
 _VISITED = 200
-
-
-def observe(states: Array) -> NDArray[np.float32]:
-    """Returns the observations [N, 3] of states [N, 2] (θ in rad, θ̇ in rad/s)."""
-    theta, speed = states.T
-    return np.stack([np.cos(theta), np.sin(theta), speed], axis=1).astype(np.float32)
+_NEAR_AN_END = 10  # steps
 
 
 @dataclass(frozen=True)
 class Episodes:
     """Simulated episodes from B starts."""
 
-    states: Array  # [steps, B, 2], θ in rad and θ̇ in rad/s
-    rewards: Array  # [steps, B]
+    states: Array  # [steps, B, S]
+    rewards: Array  # [steps, B], 0 after the end
+    playing: NDArray[np.bool_]  # [steps, B], false after the end
 
     @property
     def returns(self) -> Array:
@@ -48,90 +42,122 @@ class Episodes:
         return sums
 
 
-def simulate(act: Act, gravity: float, starts: Array) -> Episodes:
-    """Returns the episodes of a policy; a torque that is no finite number counts as 0.
+def simulate(act: Act, exact: KnownDynamics, starts: Array) -> Episodes:
+    """Returns the episodes of a policy; an effort that is no finite number counts as 0.
 
     Args:
         act: the policy.
-        gravity: m/s².
-        starts: [B, 2], θ in rad and θ̇ in rad/s.
+        exact: the task.
+        starts: [B, S].
     """
-    states = np.empty((STEPS_PER_EPISODE, *starts.shape))
-    rewards = np.empty(states.shape[:2])
-    state = starts
-    for step in range(STEPS_PER_EPISODE):
-        torque = np.nan_to_num(np.asarray(act(observe(state)), np.float64), posinf=0, neginf=0)
-        torque = np.clip(torque, -MAX_TORQUE, MAX_TORQUE)
-        reward, theta, speed = step_all_torques(gravity, state[:, 0], state[:, 1], torque[:, None])
-        states[step], rewards[step] = state, reward[:, 0]
-        state = np.stack([theta[:, 0], speed[:, 0]], axis=1)
-    return Episodes(states, rewards)
+    steps, limit = exact.task.steps_per_episode, exact.largest_effort
+    states = np.empty((steps, *starts.shape))
+    rewards, playing = np.zeros(states.shape[:2]), np.zeros(states.shape[:2], bool)
+    state, on = starts, np.ones(len(starts), bool)
+    for step in range(steps):
+        states[step], playing[step] = state, on
+        if not on.any():
+            continue
+        effort = np.nan_to_num(
+            np.asarray(act(exact.observe(state)), np.float64), posinf=0, neginf=0
+        )
+        outcomes = exact.outcomes(state, np.clip(effort, -limit, limit)[:, None])
+        rewards[step, on] = outcomes.reward[on, 0]
+        state = np.where(on[:, None], outcomes.state[:, 0], state)
+        on = on & ~outcomes.terminated[:, 0]
+    return Episodes(states, rewards, playing)
 
 
-def visited_states(q_values: Act, torques: Array, gravity: float, starts: Array) -> Array:
-    """Returns 200 states [N, 2] that a network visits, with 10 to 100 % of random torques.
+def visited_states(q_values: Act, efforts: Array, exact: KnownDynamics, starts: Array) -> Array:
+    """Returns 200 states [N, S] that a network visits, with many random actions.
 
     Args:
-        q_values: from observations [B, 3] to Q-values [B, A].
-        torques: N·m of the outputs, [A].
-        gravity: m/s².
-        starts: [B, 2].
+        q_values: from observations [B, D] to Q-values [B, A].
+        efforts: of the outputs, [A].
+        exact: the task.
+        starts: [B, S].
     """
-    random = np.random.RandomState(2)
 
-    def act(observations: NDArray[np.float32]) -> Array:
-        greedy = q_values(observations).argmax(axis=1)
-        explore = random.random_sample(len(greedy)) < epsilon
-        return torques[np.where(explore, random.randint(len(torques), size=len(greedy)), greedy)]
+    def greedy(observations: NDArray[np.float32]) -> Array:
+        return efforts[q_values(observations).argmax(axis=1)]
 
-    epsilon = np.linspace(0.1, 1, len(starts))[random.permutation(len(starts))]
-    states = simulate(act, gravity, starts).states.reshape(-1, 2)
-    return states[random.permutation(len(states))[:_VISITED]]
+    return _explored(greedy, efforts, exact, starts, np.random.RandomState(2), _VISITED)
 
 
-def training_states(
-    table: NDArray[np.float32], gravity: float, discount: float, starts: Array
-) -> Array:
-    """Returns states [N, 2] that a run meets: the exact policy with many random torques.
+def training_states(table: Table, exact: KnownDynamics, discount: float, starts: Array) -> Array:
+    """Returns states [N, S] that a run meets: the exact policy with many random actions.
 
     Args:
         table: exact V of the task.
-        gravity: m/s².
+        exact: the task.
         discount: γ.
-        starts: [B, 2].
+        starts: [B, S].
     """
-    random = np.random.RandomState(1)
 
-    def act(observation: NDArray[np.float32]) -> Array:
-        theta = np.arctan2(observation[:, 1], observation[:, 0]).astype(np.float64)
-        speed = observation[:, 2].astype(np.float64)
-        reward, next_theta, next_speed = step_all_torques(gravity, theta, speed)
-        greedy = (reward + discount * value_at(table, next_theta, next_speed)).argmax(axis=1)
-        explore = random.random_sample(len(theta)) < epsilon
-        indices = np.where(explore, random.randint(len(TORQUES), size=len(theta)), greedy)
-        return np.asarray(TORQUES[indices])
+    def greedy(observations: NDArray[np.float32]) -> Array:
+        return exact.greedy_efforts(table, discount, exact.states_of(observations))
 
-    epsilon = np.linspace(0.1, 1, len(starts))[random.permutation(len(starts))]
-    states = simulate(act, gravity, starts).states.reshape(-1, 2)
-    return states[random.permutation(len(states))[:_STATES]]
+    efforts = exact.all_efforts(exact.task.actions())
+    return _explored(greedy, efforts, exact, starts, np.random.RandomState(1), _STATES)
 
 
-def _observation_changes() -> dict[str, NDArray[np.float32]]:
-    names, identity = Pendulum.observation_names, np.eye(3, dtype=np.float32)
+def _explored(
+    greedy: Act,
+    efforts: Array,
+    exact: KnownDynamics,
+    starts: Array,
+    random: np.random.RandomState,
+    count: int,
+) -> Array:
+    """Returns `count` states [N, S] that a policy meets with a share of random actions.
+
+    The share of an episode is from `least_random` to 1. Where episodes terminate, more of them are
+    played, only their first 100 steps are used, and half of the states are near an end.
+    """
+    if not exact.task.never_terminates:
+        starts = np.tile(starts, (-(-count // (8 * len(starts))), 1))
+    epsilon = np.linspace(exact.least_random, 1, len(starts))
+    epsilon = epsilon[random.permutation(len(starts))]
+
+    def act(observations: NDArray[np.float32]) -> Array:
+        explore = random.random_sample(len(epsilon)) < epsilon
+        index = random.randint(len(efforts), size=len(epsilon))
+        return np.asarray(np.where(explore, efforts[index], greedy(observations)))
+
+    episodes = simulate(act, exact, starts)
+    if exact.task.never_terminates:
+        return _some(episodes.states[episodes.playing], count, random)
+    playing = episodes.playing & (np.arange(len(episodes.playing)) < 100)[:, None]
+    later = np.roll(episodes.playing, -_NEAR_AN_END, axis=0)
+    later[-_NEAR_AN_END:] = True  # the limit of the steps is not an end
+    near = _some(episodes.states[playing & ~later], count // 2, random)
+    return np.concatenate([near, _some(episodes.states[playing], count - len(near), random)])
+
+
+def _some(states: Array, count: int, random: np.random.RandomState) -> Array:
+    return states[random.permutation(len(states))[:count]]
+
+
+def observation_changes(exact: KnownDynamics) -> dict[str, NDArray[np.float32]]:
+    """Returns matrices [D, D] that undo a wrong order, sign or unit of the observation, by name."""
+    return _changes(exact.task.observation_names, type(exact))
+
+
+@cache
+def _changes(names: tuple[str, ...], kind: type[KnownDynamics]) -> dict[str, NDArray[np.float32]]:
+    identity = np.eye(len(names), dtype=np.float32)
     changes = {}
-    for order in permutations(range(3)):
-        for signs in product((1, -1), repeat=3):
+    for order in permutations(range(len(names))):
+        for signs in product((1, -1), repeat=len(names)):
+            if len(names) > 3 and min(signs) < 0 and list(order) != sorted(order):
+                continue  # there are hundreds of such pairs, and programs hardly have them
             name = ", ".join(
                 ("-" if sign < 0 else "") + names[i] for i, sign in zip(order, signs, strict=True)
             )
             changes[name] = identity[:, list(order)] * np.array(signs, np.float32)
-    # Both signs turned is the reversed torque: the pendulum is symmetric.
-    for name in ("cos θ, sin θ, θ̇", "cos θ, -sin θ, -θ̇"):
-        del changes[name]
-    for name, factor in (("θ̇·π/180", np.pi / 180), ("θ̇·180/π", 180 / np.pi), ("θ̇/8", 1 / 8)):
-        changes[f"cos θ, sin θ, {name}"] = np.diag(np.array([1, 1, factor], np.float32))
+    # A mirrored observation is a reversed effort, because the task is symmetric.
+    for same in (identity, np.diag(np.array(kind.mirror, np.float32))):
+        changes = {name: each for name, each in changes.items() if not np.array_equal(each, same)}
+    for units, factors in kind.other_units.items():
+        changes[units] = np.diag(np.array(factors, np.float32))
     return changes
-
-
-# Matrices [3, 3] that undo a wrong order, sign or unit of the observation, by name.
-OBSERVATION_CHANGES = _observation_changes()

@@ -12,42 +12,9 @@ from keras_pendulum.diagnosis.faults import Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 
 
-def stored_transitions(m: Measurement) -> Finding | None:
-    """Checks the stored transitions against the pendulum: a mismatch is a proof."""
-    r, torques = m.record, m.torques
-    if r is None or len(r.replay.action) < 200:
-        return None
-    reward_correlation, reward_slope = r.reward_fit(torques)
-    if reward_correlation < -0.9:
-        return Finding("reward-sign", "stored rewards are the negative of the exact ones", "equal")
-    terminal = r.replay.terminated.mean()
-    if terminal > 0.2:
-        evidence = f"{terminal:.0%} of the stored transitions end their episode"
-        return Finding("no-bootstrapping", evidence, "none: the pendulum never terminates")
-    gravity, torque_correlation = r.motion_fit(torques)
-    if torque_correlation < 0.9 and not r.lost_actions(torques):
-        return Finding(
-            "misaligned-transitions",
-            f"correlation of the stored action with the torque that acted {torque_correlation:.2f}",
-            "1.00",
-        )
-    if abs(gravity - m.task.gravity) > 0.3 * m.task.gravity:
-        evidence = f"stored transitions of a pendulum with g = {gravity:.2f}"
-        return Finding("other-gravity", evidence, f"{m.task.gravity:.2f}")
-    if reward_correlation > 0.999 and not 0.5 < reward_slope < 2:
-        evidence = f"stored rewards {reward_slope:.3g} times the declared ones"
-        return Finding("reward-scale", evidence, "1")
-    if 0.6 < reward_correlation < 0.9999 and 0.8 < reward_slope < 1.2:
-        residual = float(np.sqrt(1 - reward_correlation**2))
-        if residual > 0.02 and r.shifted_reward_fit(torques) > 0.9999:
-            evidence = "stored rewards are those of the step before"
-            return Finding("misaligned-transitions", evidence, "those of their own step")
-    return None
-
-
 def untrained_outputs(m: Measurement) -> Finding | None:
     """Finds outputs that are stored as others, never stored, or far from all others."""
-    lost = [] if m.record is None else m.record.lost_actions(m.torques)
+    lost = [] if m.record is None else m.motion.lost_actions()
     if lost:
         return Finding(
             "untrained-outputs",
@@ -56,7 +23,7 @@ def untrained_outputs(m: Measurement) -> Finding | None:
             repairs.mask_outputs(m, lost),
         )
     if m.record is not None:
-        counts = np.bincount(m.record.replay.action, minlength=len(m.torques))
+        counts = np.bincount(m.record.replay.action, minlength=len(m.efforts))
         missing = np.flatnonzero(counts == 0).tolist()
         # An output that is drawn at random λ times on average is missed with probability exp(-λ).
         chance = m.record.random_count / len(counts) - np.log(len(counts))
@@ -101,49 +68,9 @@ def too_few_updates(m: Measurement) -> Finding | None:
     return Finding("too-few-updates", evidence, "1.00, after some 10 000 updates")
 
 
-def exploration(m: Measurement) -> Finding | None:
-    """Finds an ε that does not fall, or starts low."""
-    r = m.record
-    if r is None or len(r.history) < 20:
-        return None
-    epsilons = np.array([record.epsilon for record in r.history])
-    last, first = epsilons[-len(epsilons) // 5 :].mean(), epsilons[: len(epsilons) // 5].mean()
-    if last > 0.5:
-        return Finding("exploration", f"ε of the last fifth {last:.2f}", "below 0.1")
-    if first < 0.1:
-        return Finding("exploration", f"ε of the first fifth {first:.2f}", "above 0.3")
-    return None
-
-
-def narrow_starts(m: Measurement) -> Finding | None:
-    """Finds a part of the plane that was never visited."""
-    r = m.record
-    if r is None:
-        return None
-    seen = r.seen_cells()
-    if r.steps < 3 * len(r.replay.action) and seen < 0.75:
-        evidence = f"stored states in {seen:.0%} of the plane's cells up to 4 rad/s"
-        return Finding("narrow-starts", evidence, "above 90 %")
-    return None
-
-
-def forgetting(m: Measurement) -> Finding | None:
-    """Finds a replay buffer that holds a small part of the run."""
-    r = m.record
-    if r is None:
-        return None
-    stored = len(r.replay.action)
-    if r.steps >= 3 * stored and stored < 6000:
-        lower = (r.replay.observation[:, 0] < 0).mean()
-        evidence = f"the buffer holds {stored} of {r.steps} transitions, "
-        evidence += f"{lower:.0%} of them in the lower half"
-        return Finding("forgetting", evidence, "14 000 or more, as `reference` has")
-    return None
-
-
 def learning_rate(m: Measurement) -> Finding | None:
     """Finds a large recorded learning rate."""
-    if m.record is None:
+    if m.record is None or m.record.config is None:
         return None
     rate, schedule = m.record.config.learning_rate, m.record.config.learning_rate_schedule
     if rate < 5e-3 and (schedule != "constant" or rate < 2e-3):

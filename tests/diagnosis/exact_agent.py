@@ -16,6 +16,7 @@ from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.optimum.discounted import exact_q, solve_discounted
 from keras_pendulum.optimum.dynamics import TORQUES
+from keras_pendulum.optimum.pendulum import PendulumSolution
 
 NOISE = np.random.RandomState(0).normal(size=(3, 41))
 
@@ -53,6 +54,9 @@ class ExactPolicy(Policy):
     def act(self, observations: Any) -> Any:
         indices = self._q_values(observations).argmax(axis=1)
         return self._share * TORQUES[indices][:, np.newaxis]
+
+
+PENDULUM = PendulumSolution(Pendulum())
 
 
 def measure(

@@ -1,6 +1,7 @@
 import json
 import re
 from pathlib import Path
+from urllib.request import url2pathname
 
 import pytest
 from conftest import Refusal
@@ -8,13 +9,13 @@ from exact_agent import coarse_value, diagnose_values, exact_values
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import __main__ as command
-from keras_pendulum.diagnosis import measurement
 from keras_pendulum.diagnosis.report import as_html
+from keras_pendulum.optimum import pendulum
 
 
 @pytest.fixture(autouse=True)
 def _coarse_tables(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measurement, "discounted_value", coarse_value)
+    monkeypatch.setattr(pendulum, "discounted_value", coarse_value)
 
 
 @pytest.fixture
@@ -56,7 +57,12 @@ def test_report_is_one_escaped_file(weights: Path, tmp_path: Path) -> None:
     assert command.main([str(weights), "--report", str(report)]) == 0
     text = report.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>") and "width=device-width" in text
-    assert not re.findall(r'(?:src|href)="(?!data:)', text)
+    assert not re.findall(r'(?:src|href)="(?!data:|file:)', text)
+    linked = re.findall(r'href="([^"]+)"', text)
+    assert linked and all(
+        Path(url2pathname(link.removeprefix("file://").partition("#")[0])).is_file()
+        for link in linked
+    )
 
     diagnosis = diagnose_values(lambda o: exact_values(o)[:, ::-1])
     diagnosis.measurement.policy.name = '<script>alert("x")</script>$\n'
@@ -79,7 +85,7 @@ def test_figure_is_drawn_without_q_values_too() -> None:
         (["{weights}", "--torques=-1,1"], "error: torques has 2 numbers"),
         (["{folder}"], "error: {folder}: holds no run (no pendulum_weight.h5"),
         (["{folder}/agents.py:Trainer"], "error: {folder}/agents.py:Trainer: agent is the class "),
-        (["cartpole"], "error: cartpole belongs to CartPole-v1; diagnose is for"),
+        (["cartpole", "--gravity", "1"], "error: gravity belongs to Pendulum-v1"),
         (
             ["{weights}", "--report", "{weights}"],
             "error: --report is {weights}: expected a",

@@ -95,9 +95,8 @@ def test_right_values_with_an_error_are_not_blamed(size: float, seed: int) -> No
 )
 def test_equation_needs_a_margin(changes: dict[str, float], explains: bool) -> None:
     equation = Equation("wrong-target", "", "", lambda b: b.right)
-    declared = diagnose(fixed_point(right)).measurement.backup
     own, best = Agreement(0.1, 0.9, 1.0, 1.0), Agreement(0.2, 0.5, 1.0, 0.0)
-    assert equation.explains(own._replace(**changes), best, declared) is explains
+    assert equation.explains(own._replace(**changes), best) is explains
 
 
 @pytest.mark.parametrize(
@@ -108,9 +107,8 @@ def test_equation_without_advantages_needs_flat_values(
     advantages: float, correlation: float, explains: bool
 ) -> None:
     equation = Equation("wrong-loss", "", "", lambda b: b.right, flat=0.4)
-    declared = diagnose(fixed_point(right)).measurement.backup
     own = Agreement(0.1, 0.0, advantages, 1.0)
-    assert equation.explains(own, Agreement(0.2, correlation, 1.0, 0.0), declared) is explains
+    assert equation.explains(own, Agreement(0.2, correlation, 1.0, 0.0)) is explains
 
 
 def test_target_network_that_is_never_copied_is_named() -> None:
@@ -186,3 +184,16 @@ def test_values_that_are_not_numbers_are_a_broken_network(kind: str) -> None:
     diagnosis = kp.diagnose(agent)
     assert first(diagnosis) == "broken-network"
     assert "not finite" in diagnosis.summary()
+
+
+@pytest.mark.parametrize(("mean", "size"), [(2.5, 1.2), (1.1, 0.7)])
+def test_index_that_changes_with_the_state_is_named(mean: float, size: float) -> None:
+    values = fixed_point(TARGETS["no-bootstrapping"])
+    diagnosis = diagnose(lambda o: values(o) + mean + size * np.sin(7 * o @ UNTRAINED))
+    assert first(diagnosis) == "wrong-target (index-for-value)"
+
+
+def test_constant_above_every_index_is_none() -> None:
+    values = fixed_point(TARGETS["no-bootstrapping"])
+    diagnosis = diagnose(lambda o: values(o) + 11 + 2 * np.sin(7 * o @ UNTRAINED))
+    assert first(diagnosis) == "not-converged"

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import NOISE, exact_values, measure
+from exact_agent import NOISE, PENDULUM, exact_values, measure
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.diagnosis.acting_rules import observation_map, torque_map
 from keras_pendulum.diagnosis.findings import find
 from keras_pendulum.diagnosis.run_record import RunRecord
-from keras_pendulum.diagnosis.states import Episodes, observe
+from keras_pendulum.diagnosis.states import Episodes
 from keras_pendulum.diagnosis.training_rules import overestimation, stored_rewards
 from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
@@ -27,13 +27,17 @@ def untrained(observations: Any) -> Any:
 def record_of(q_values: Any, **settings: Any) -> RunRecord:
     """Returns the record of a greedy run of the pendulum with g = 1 from random states."""
     states = np.random.RandomState(0).uniform((-np.pi, -8), (np.pi, 8), (600, 2))
-    observations = observe(states)
+    observations = PENDULUM.observe(states)
     actions = q_values(observations).argmax(axis=1).astype(np.int32)
     rows = np.arange(len(actions))
     reward, theta, speed = step_all_torques(1.0, states[:, 0], states[:, 1], TORQUES)
     following = np.stack([theta[rows, actions], speed[rows, actions]], axis=1)
     replay = Transitions(
-        observations, actions, reward[rows, actions], observe(following), np.zeros(600, bool)
+        observations,
+        actions,
+        reward[rows, actions],
+        PENDULUM.observe(following),
+        np.zeros(600, bool),
     )
     return RunRecord(replace(Config(), **settings), [], replay)
 
@@ -108,6 +112,6 @@ def test_torque_map_explains_values_that_the_policy_does_not_collect() -> None:
 
 def test_returns_to_go_are_the_discounted_sums_of_the_rest() -> None:
     rewards = np.array([[1.0, 0], [2, 0], [4, 8]])
-    episodes = Episodes(np.zeros((3, 2, 2)), rewards)
+    episodes = Episodes(np.zeros((3, 2, 2)), rewards, np.ones((3, 2), bool))
     assert episodes.returns_to_go(0.5).tolist() == [[3, 2], [4, 4], [4, 8]]
     assert rewards[0, 0] == 1

@@ -3,10 +3,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import NOISE, diagnose_values, exact_values
+from exact_agent import NOISE, PENDULUM, diagnose_values, exact_values, measure
 
 import keras_pendulum as kp
+from keras_pendulum.config.config import Config
+from keras_pendulum.diagnosis.motion import Motion
 from keras_pendulum.diagnosis.run_record import RunRecord, read_record
+from keras_pendulum.diagnosis.stored_rewards import StoredRewards
 from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.optimum.dynamics import TORQUES
 from keras_pendulum.storage.run_folder import find_run
@@ -18,6 +21,11 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
     config = kp.preset("reference", episodes=30, hidden_units=(8,), warmup_episodes=30)
     kp.train_dqn(config, folder)  # without an update
     return read_record(find_run(folder))
+
+
+def settings(record: RunRecord) -> Config:
+    assert record.config is not None
+    return record.config
 
 
 def changed(record: RunRecord, **fields: Any) -> RunRecord:
@@ -46,23 +54,28 @@ def useless(observations: Any) -> Any:
     return exact_values(observations) * np.sin(20 * observations[:, :1])
 
 
+def motion(record: RunRecord) -> Motion:
+    return measure(useless, record).motion
+
+
 def first(record: RunRecord) -> str:
     """Returns the first finding on a useless agent with this record."""
     return diagnose_values(useless, record).findings[0].name
 
 
 def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> None:
-    assert record.motion_fit(TORQUES) == pytest.approx((1, 1), abs=0.01)
-    assert record.reward_fit(TORQUES) == pytest.approx((1, 1), abs=1e-4)
-    assert record.shifted_reward_fit(TORQUES) < 0.9999
+    assert motion(record).fit() == pytest.approx((1, 1), abs=0.01)
+    rewards = StoredRewards.of(record, PENDULUM, TORQUES, 1.0)
+    assert rewards.fit == pytest.approx((1, 0, 1), abs=1e-3)
+    assert rewards.shifted_correlation < 0.9999
     assert not record.replay.terminated.any()
-    assert record.steps == len(record.replay.action) == 30 * record.config.max_episode_steps
+    assert record.steps == len(record.replay.action) == 30 * settings(record).max_episode_steps
 
 
 def test_declared_reward_scale_is_no_fault(record: RunRecord) -> None:
     scaled = changed(record, reward=50 * record.replay.reward)
-    scaled = replace(scaled, config=replace(record.config, reward_scale=50.0))
-    assert scaled.reward_fit(TORQUES)[1] == pytest.approx(1, abs=1e-4)
+    rewards = StoredRewards.of(scaled, PENDULUM, TORQUES, 50.0)
+    assert rewards.fit.slope == pytest.approx(1, abs=1e-4)
 
 
 def before(record: RunRecord, field: str) -> RunRecord:
@@ -89,8 +102,8 @@ def test_changed_record_is_named(fault: str, change: Any, record: RunRecord) -> 
 
 @pytest.mark.parametrize(("action", "other"), [(3, 4), (39, 40), (0, 40)])
 def test_action_stored_as_another_is_lost(record: RunRecord, action: int, other: int) -> None:
-    assert record.lost_actions(TORQUES) == []
-    assert stored_as(record, action, other).lost_actions(TORQUES) == [action]
+    assert motion(record).lost_actions() == []
+    assert motion(stored_as(record, action, other)).lost_actions() == [action]
     assert first(stored_as(record, action, other)) == "untrained-outputs"
 
 
@@ -104,14 +117,14 @@ def test_torques_between_the_outputs_lose_no_action(record: RunRecord) -> None:
     kept = selected(record, record.replay.action < 40)
     following = kept.replay.next_observation + np.array([0, 0, 0.01], np.float32)
     following[::2, 2] -= 0.02
-    assert changed(kept, next_observation=following).lost_actions(TORQUES) == []
+    assert motion(changed(kept, next_observation=following)).lost_actions() == []
 
 
 @pytest.mark.parametrize("stored", [240, 1000])
 def test_transitions_off_by_one_lose_no_action(record: RunRecord, stored: int) -> None:
     last = selected(record, slice(-stored, None))
     shifted = changed(last, action=np.roll(last.replay.action, 1))
-    assert shifted.lost_actions(TORQUES) == []
+    assert motion(shifted).lost_actions() == []
 
 
 def test_another_gravity_of_the_stored_transitions_is_named(record: RunRecord) -> None:
@@ -143,7 +156,7 @@ def test_few_recorded_updates_explain_small_values(record: RunRecord) -> None:
 
 
 def test_recorded_learning_rate_is_named_beside_another_fault(record: RunRecord) -> None:
-    large = replace(record, config=replace(record.config, learning_rate=0.05))
+    large = replace(record, config=replace(settings(record), learning_rate=0.05))
     terminal = changed(large, terminated=np.ones_like(record.replay.terminated))
     names = [finding.name for finding in diagnose_values(useless, terminal).findings]
     assert names[:2] == ["no-bootstrapping", "learning-rate"]

@@ -27,9 +27,9 @@ def test_advantages_leave_no_value_of_the_state() -> None:
     assert signals.advantages(EXACT + 7) == pytest.approx(signals.advantages(EXACT))
 
 
-def test_output_torques_follow_a_permutation_and_a_scale() -> None:
+def test_output_efforts_follow_a_permutation_and_a_scale() -> None:
     order = np.random.RandomState(1).permutation(41)
-    found = signals.output_torques(0.5 * EXACT[:, order], EXACT, TORQUES)
+    found = signals.output_efforts(0.5 * EXACT[:, order], EXACT, TORQUES)
     assert found == pytest.approx(0.5 * TORQUES[order])
 
 

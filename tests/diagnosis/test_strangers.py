@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -84,27 +85,28 @@ def test_benchmark_uses_its_networks_again(
 ) -> None:
     calls = []
 
-    def short(program: Program) -> object:
+    def short(program: Program, wrap: Callable[[Any], Any]) -> object:
         calls.append(program)
-        return train(Program(steps=210, hidden=(4,), torque_count=3, seed=program.seed))
+        return train(Program(steps=210, hidden=(4,), torque_count=3, seed=program.seed), wrap)
 
     monkeypatch.setattr(strangers, "train", short)
-    monkeypatch.setattr(strangers, "KINDS", ["right", "tanh head"])
+    kinds = ["right", "tanh head", "no random actions", "no replay"]
+    monkeypatch.setattr(strangers, "KINDS", {"Pendulum-v1": kinds})
     monkeypatch.setattr(
         strangers, "make_program", lambda changes, seed: Program(hidden=(4,), torque_count=3)
     )
     written: list[list[dict[str, object]]] = []
     monkeypatch.setattr(strangers, "write", lambda name, command, rows: written.append(rows))
     strangers.main(str(tmp_path), "1", "1")
-    assert len(calls) == 3
+    assert len(calls) == 5
     assert [row["program"] for row in written[0]] == [
-        *("right", "tanh head", "all mistakes", "all right programs")
+        *(*kinds, "all mistakes", "all right programs")
     ]
     strangers.main(str(tmp_path), "1", "1")
-    assert len(calls) == 3 and written[0] == written[1]
+    assert len(calls) == 5 and written[0] == written[1]
     (tmp_path / "strangers.jsonl").unlink()
     strangers.main(str(tmp_path), "1", "1")
-    assert len(calls) == 3 and written[0] == written[2]
+    assert len(calls) == 5 and written[0] == written[2]
 
 
 def test_wrong_answers_are_counted() -> None:
@@ -119,3 +121,37 @@ def test_wrong_answers_are_counted() -> None:
     assert rows["tanh head"]["right first finding"] == "0 of 1 (0 %)"
     assert rows["tanh head"]["costs little"] == 1
     assert rows["all right programs"]["instead"] == "torque-map 1"
+
+
+def test_mistakes_of_the_storage_change_what_is_stored() -> None:
+    """Compares the stored steps with what the environment did; no network learns enough here."""
+    import keras_pendulum as kp
+
+    recorders: list[Any] = []
+
+    def wrap(env: Any) -> Any:
+        recorders.append(kp.Recorder(env))
+        return recorders[-1]
+
+    def run(**changes: Any) -> tuple[dict[str, Any], Any]:
+        program = Program(steps=260, hidden=(4,), torque_count=5, library="keras", **changes)
+        stored = train(program, wrap)
+        return stored.steps, recorders[-1].steps
+
+    stored, played = run()
+    torques = np.linspace(-2, 2, 5)
+    assert np.array_equal(stored["observation"], played.observation)
+    assert np.allclose(torques[stored["action"]], played.action)
+    stored, played = run(stores_next_index=True)
+    assert np.allclose(torques[(stored["action"] - 1) % 5], played.action)
+    stored, played = run(stores_greedy=True)
+    assert 0.1 < np.mean(torques[stored["action"]] != played.action) < 0.9
+    stored, played = run(keeps_first_state=True)
+    assert len(np.unique(stored["observation"], axis=0)) == 2
+    assert np.array_equal(stored["next_observation"], played.next_observation)
+    stored, played = run(capacity=64, consecutive=True, episode_steps=50, truncation_is_end=True)
+    assert len(stored["reward"]) == 64 and stored["terminated"].sum() == 2
+    assert played.first.sum() == 6
+    stored, played = run(start=0.1, env_reward=lambda reward: max(reward, -0.01))
+    assert played.reward.min() == pytest.approx(-0.01)
+    assert np.abs(played.observation[played.first][:, 1]).max() < 0.1

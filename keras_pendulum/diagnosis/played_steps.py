@@ -1,0 +1,144 @@
+"""The steps of a recorder: the share of random actions, the starts, and the return over time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.diagnosis.record_observations import find_change
+from keras_pendulum.diagnosis.record_sources import read_actions
+from keras_pendulum.diagnosis.recorded_steps import Steps
+from keras_pendulum.diagnosis.signals import Array, nearest
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
+
+PARTS = 10  # of the run, for the share of random actions
+_ROWS, _COMPARED = 4000, 500  # the last rows of a part, and how many of them are compared
+_CLOSE = 0.5  # N·m or N, between efforts that count as the same
+_LEVELS = np.linspace(-2, 2, 9)  # N·m, for an agent without outputs
+
+
+class PlayedSteps(NamedTuple):
+    """The steps that a program made."""
+
+    steps: Steps
+    effort: Array  # [N] N·m or N
+    levels: Array  # [A]: the efforts among which a random action is drawn
+    dynamics: KnownDynamics
+
+    @classmethod
+    def of(cls, steps: Steps, efforts: Array | None, dynamics: KnownDynamics) -> PlayedSteps:
+        """Returns the steps with their efforts; `efforts` are those of the agent's outputs.
+
+        Raises ConfigError as `read_actions` does.
+        """
+        indices, effort = read_actions(steps.action, efforts, "record")
+        change = find_change(
+            dynamics, steps.observation, steps.action, steps.next_observation, "record"
+        )
+        steps = steps._replace(
+            observation=steps.observation @ change, next_observation=steps.next_observation @ change
+        )
+        if effort is None:
+            assert efforts is not None
+            effort = efforts[indices]
+        return cls(steps, effort, _LEVELS if efforts is None else efforts, dynamics)
+
+    def random_shares(self) -> Array | None:
+        """Returns the share of random actions in each tenth of the run, at most; None if short.
+
+        A greedy policy gives similar efforts in similar states and in successive steps, and some
+        efforts more often than others. Random ones do neither. Each of the three comparisons shows
+        a bound, and the lowest one counts.
+        """
+        order = np.argsort(self.steps.time, kind="stable")
+        if len(order) < 100 * PARTS:
+            return None
+        return np.array(
+            [self._random_share(np.sort(rows[-_ROWS:])) for rows in np.array_split(order, PARTS)]
+        )
+
+    def _random_share(self, rows: NDArray[np.intp]) -> float:
+        effort, levels = self.effort[rows], self.levels
+        chance = float(np.mean(np.abs(levels[:, None] - levels) <= _CLOSE))
+        compared = np.random.RandomState(0).permutation(len(rows))[:_COMPARED]
+        distance = self._distances(rows[compared], rows)
+        distance[np.abs(compared[:, None] - np.arange(len(rows))) < 3] = np.inf  # of the same time
+        closest = distance.argmin(axis=1)
+        follows = np.diff(rows) + np.diff(self.steps.time[rows]) == 2  # of the same environment
+        pairs = (
+            np.abs(effort[compared] - effort[closest]),
+            np.abs(np.diff(effort)[follows]),
+        )
+        bounds = []
+        for difference in pairs:
+            both_greedy = (np.mean(difference <= _CLOSE) - chance) / (1 - chance)
+            bounds.append(1 - np.sqrt(max(0.0, both_greedy)))
+        counts = np.bincount(nearest(effort, levels), minlength=len(levels))
+        rare = np.sort(counts)[: (len(levels) + 1) // 2].mean() * len(levels) / len(rows)
+        return float(min(*bounds, rare))
+
+    def episodes(self) -> list[slice]:
+        """Returns the rows of each recorded episode, in order of time.
+
+        Episodes that are much shorter than the usual one are left out, unless they terminated: they
+        are not complete.
+        """
+        steps = self.steps
+        starts = np.flatnonzero(steps.first | (np.diff(steps.time, prepend=-1) < 1))
+        ends = np.append(starts[1:], len(steps.first))
+        found = [
+            slice(int(start), int(end))
+            for start, end in zip(starts, ends, strict=True)
+            if steps.first[start]
+            and (steps.terminated[end - 1] or end - start >= 0.5 * np.median(ends - starts))
+        ]
+        return sorted(found, key=lambda rows: int(steps.time[rows.start]))
+
+    def constant_episodes(self, episodes: list[slice]) -> tuple[float, float] | None:
+        """Returns how often two steps have the same effort, where that shows a state that is old.
+
+        The first share is that of two steps of the same episode, at any states. The second share
+        is that of two steps at nearly the same state in two episodes. Returns None unless nearly
+        all steps of an episode have one effort, and the second share is the lower one.
+        """
+        within = []
+        for episode in episodes:
+            _, counts = np.unique(self.effort[episode], return_counts=True)
+            within.append(((counts / counts.sum()) ** 2).sum())
+        same_episode = float(np.mean(within))
+        if same_episode < 0.8:
+            return None
+        rows = np.concatenate([np.arange(each.start, each.stop) for each in episodes])
+        numbers = np.repeat(np.arange(len(episodes)), [each.stop - each.start for each in episodes])
+        rows, numbers = rows[-2 * _ROWS :], numbers[-2 * _ROWS :]
+        compared = np.random.RandomState(0).permutation(len(rows))[:_COMPARED]
+        distance = self._distances(rows[compared], rows)
+        distance[numbers[compared][:, None] == numbers] = np.inf
+        same = self.effort[rows[compared]] == self.effort[rows[distance.argmin(axis=1)]]
+        same_state = float(np.mean(same))
+        return (same_episode, same_state) if same_state < same_episode - 0.1 else None
+
+    def _distances(self, some: NDArray[np.intp], rows: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Returns distances between states [S, N]; a number that depends on `some` is missing."""
+        states = self.steps.observation / np.array(self.dynamics.observation_sizes, np.float32)
+        distances: NDArray[np.float32] = (states[rows] ** 2).sum(axis=1) - 2 * (
+            states[some] @ states[rows].T
+        )
+        return distances
+
+    def curve(self) -> Array:
+        """Returns the exact return of each episode, [E], as the task's learning curves show it."""
+        states = self.dynamics.states_of(self.steps.observation)
+        rewards = self.dynamics.outcomes(states, self.effort[:, None]).reward[:, 0]
+        shown = self.dynamics.task.curve_value
+        return np.array(
+            [shown(float(rewards[rows].sum()), rows.stop - rows.start) for rows in self.episodes()]
+        )
+
+    def start_sectors(self, sectors: int = 8) -> tuple[int, int]:
+        """Returns in how many sectors of θ an episode starts, and the number of episodes."""
+        theta = self.dynamics.states_of(self.steps.observation[self.steps.first])[:, 0]
+        found = np.floor((theta + np.pi) / (2 * np.pi) * sectors).clip(0, sectors - 1)
+        return len(np.unique(found)), len(theta)

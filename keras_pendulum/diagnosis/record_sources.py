@@ -1,0 +1,176 @@
+"""Reads what a program hands in: the steps of a recorder, and the content of a replay buffer."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from keras_pendulum.diagnosis.recorded_steps import Steps, read_steps
+from keras_pendulum.diagnosis.recorder import Recorder, VectorRecorder
+from keras_pendulum.diagnosis.signals import nearest
+from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.errors import ConfigError, UserError
+
+Array = NDArray[Any]
+
+_FIELDS = "(s, a, r, s′, done)"
+
+
+def steps_of(record: Any, task: Task) -> Steps:
+    """Returns the steps of a recorder, or those of its file.
+
+    Raises TypeError for another object, UserError for a file that a recorder did not write, and
+    ConfigError for steps of another environment.
+    """
+    if isinstance(record, Recorder | VectorRecorder):
+        name, steps = "the recorder", record.steps
+    elif isinstance(record, str | os.PathLike):
+        name = os.fspath(record)
+        steps = read_steps(name)
+    else:
+        raise TypeError(
+            f"record is a {type(record).__name__}; expected a kp.Recorder, or the path of the file "
+            "that its save() wrote"
+        )
+    if not len(steps.reward):
+        raise UserError(f"{name} has no step: put it around the environment before the training")
+    if steps.observation.shape[1] != task.observation_size or steps.action.ndim != 1:
+        raise ConfigError(
+            f"{name} has observations of {steps.observation.shape[1]} numbers and actions of the "
+            f"shape {list(steps.action.shape[1:])}; those of {task.environment} are "
+            f"{task.observation_size} and one number"
+        )
+    return steps
+
+
+def transitions_of(given: Any, task: Task) -> Transitions:
+    """Returns the transitions of a replay buffer; the actions are as given, float64 or int64 [N].
+
+    Args:
+        given: five arrays (s, a, r, s′, done), or a list of N such tuples; s and s′ may be [N, D],
+            [N, 1, D] or [N, D, 1], the others [N] or [N, 1].
+        task: whose observations they are.
+
+    Raises ConfigError, with the name of the field, for other arrays, and TypeError for an object
+    that is not a sequence.
+    """
+    columns = _columns(given, task.observation_size)
+    rows = len(columns[0])
+    if not rows:
+        raise ConfigError(f"transitions is empty; expected {_FIELDS} of a replay buffer")
+    arrays: list[Array] = []
+    for name, column in zip(Transitions._fields, columns, strict=True):
+        size = task.observation_size if name.endswith("observation") else 1
+        array = _as_array(name, column)
+        if len(array) != rows or array.size != rows * size:
+            raise ConfigError(
+                f"transitions: {name} has the shape {list(array.shape)}; expected {rows} times "
+                f"{size} numbers, in {_FIELDS}"
+            )
+        arrays.append(array.reshape(rows, size) if size > 1 else array.reshape(rows))
+    observation, action, reward, following, terminated = arrays
+    _require_finite("transitions", observation, action, reward, following, terminated)
+    if not np.isin(terminated, (0, 1)).all():
+        raise ConfigError("transitions: done has other values than 0 and 1")
+    return Transitions(
+        observation.astype(np.float32),
+        action.astype(np.float64) if action.dtype.kind == "f" else action.astype(np.int64),
+        reward.astype(np.float32),
+        following.astype(np.float32),
+        terminated.astype(bool),
+    )
+
+
+def read_actions(
+    actions: Array, torques: Array | None, name: str
+) -> tuple[Array, NDArray[np.float64] | None]:
+    """Returns the recorded actions as indices [N], and as torques in N·m where they are torques.
+
+    A torque gets the index of the nearest one of `torques`. Without them, the torques are returned
+    in place of the indices. Whole numbers from 0 to A - 1 are indices, unless they are
+    floating-point numbers that are all torques, too.
+
+    Raises ConfigError, which begins with `name`, for numbers that are neither.
+    """
+    floating = actions.dtype.kind == "f"
+    if torques is not None:
+        indices = actions.astype(np.int32)
+        closest = nearest(actions, torques)
+        are_indices = (indices == actions).all() and (indices >= 0).all()
+        are_torques = floating and np.mean(np.abs(actions - torques[closest]) < 1e-3) >= 0.95
+        if are_indices and not are_torques and indices.max() < len(torques):
+            return indices, None
+    are_torques = torques is None or np.abs(torques).max() <= MAX_TORQUE
+    if not are_torques:
+        raise ConfigError(
+            f"{name}: the actions are from {actions.min():g} to {actions.max():g}; expected the "
+            "indices 0 and 1"
+        )
+    if np.abs(actions).max() > (2 if floating else 1) * MAX_TORQUE:
+        indices_allowed = "" if torques is None else f"indices from 0 to {len(torques) - 1}, or "
+        raise ConfigError(
+            f"{name}: the actions are from {actions.min():g} to {actions.max():g}; expected "
+            f"{indices_allowed}torques from -2 to 2 N·m"
+        )
+    torque = actions.astype(np.float64).clip(-MAX_TORQUE, MAX_TORQUE)  # as the pendulum does
+    return torque if torques is None else closest, torque
+
+
+def _columns(given: Any, observed: int) -> Sequence[Any]:
+    """Returns the five columns of arrays, or of a list of rows."""
+    count = len(Transitions._fields)
+    try:
+        items = list(given)
+    except TypeError:
+        raise TypeError(
+            f"transitions is a {type(given).__name__}; expected {_FIELDS}: five arrays, or a list "
+            "of such tuples"
+        ) from None
+    if all(_is_row(item, observed) for item in items):
+        return [[item[place] for item in items] for place in range(count)]
+    if len(items) != count:
+        raise ConfigError(
+            f"transitions has {len(items)} items that are not all {_FIELDS}; expected five arrays, "
+            "or a list of such tuples"
+        )
+    return items
+
+
+def _is_row(item: Any, observed: int) -> bool:
+    """Returns whether an item is a tuple (s, a, r, s′, done), not an array of one of them."""
+    if not isinstance(item, tuple | list) or len(item) != len(Transitions._fields):
+        return False
+    try:
+        return [np.size(_plain(each)) for each in item] == [observed, 1, 1, observed, 1]
+    except ValueError:  # lists of several lengths
+        return False
+
+
+def _plain(value: Any) -> Any:
+    """Returns an array of PyTorch or TensorFlow as one of NumPy."""
+    if hasattr(value, "detach"):
+        value = value.detach().cpu()
+    return value.numpy() if hasattr(value, "numpy") else value
+
+
+def _as_array(name: str, column: Any) -> Array:
+    try:
+        if isinstance(column, list | tuple):
+            column = [_plain(each) for each in column]
+        array = np.asarray(_plain(column))
+    except (TypeError, ValueError):  # such as rows of several lengths
+        array = np.empty(0, object)
+    if array.dtype.kind not in "fiub" or array.ndim < 1:
+        raise ConfigError(f"transitions: {name} is not an array of numbers, in {_FIELDS}")
+    return array
+
+
+def _require_finite(name: str, *arrays: Array) -> None:
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise ConfigError(f"{name}: NaN or infinite numbers; expected finite ones")

@@ -1,0 +1,65 @@
+"""The rewards of stored transitions, compared with the exact ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from keras_pendulum.diagnosis.run_record import RunRecord
+from keras_pendulum.diagnosis.signals import Array, Fit, line_fit
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
+
+_MOST_REWARDS = 4000  # that are compared with each other
+
+
+@dataclass(frozen=True)
+class StoredRewards:
+    """The stored rewards [N], in units of the declared ones, and the exact ones."""
+
+    record: RunRecord
+    stored: Array
+    exact: Array
+
+    @classmethod
+    def of(
+        cls, record: RunRecord, dynamics: KnownDynamics, efforts: Array, scale: float
+    ) -> StoredRewards:
+        """Returns the rewards of a record; `efforts` [A] are those of the outputs."""
+        states = dynamics.states_of(record.replay.observation)
+        acted = record.stored_efforts(efforts)[:, None]
+        exact = dynamics.outcomes(states, acted).reward[:, 0]
+        return cls(record, record.replay.reward.astype(np.float64) / scale, exact)
+
+    @property
+    def fit(self) -> Fit:
+        """The line through stored over exact rewards; constant ones that are equal fit, too."""
+        if not np.ptp(self.exact):
+            slope = float(np.median(self.stored) / self.exact[0])
+            close = np.abs(self.stored - slope * self.exact) < 0.01 * abs(slope)
+            return Fit(slope, 0.0, float(np.sign(slope) * close.mean()))
+        return line_fit(self.stored, self.exact)
+
+    @property
+    def shifted_correlation(self) -> float:
+        """The correlation with the exact rewards of the step before."""
+        follows = self.record.follows
+        return line_fit(self.stored[1:][follows], self.exact[:-1][follows]).correlation
+
+    def follow_states(self, sizes: tuple[float, ...]) -> bool:
+        """Returns whether they differ from the exact ones by what the state says, not by noise.
+
+        In nearly the same states, the differences are then nearly the same.
+
+        Args:
+            sizes: usual largest absolute values of an observation, [D].
+        """
+        exact = self.exact[-_MOST_REWARDS:]
+        stored = self.stored[-_MOST_REWARDS:]
+        rest = stored - line_fit(stored, exact).slope * exact
+        observations = self.record.replay.observation[-_MOST_REWARDS:]
+        states = observations / np.array(sizes, np.float32)
+        some = np.random.RandomState(0).permutation(len(rest))[:500]
+        distance = (states**2).sum(axis=1) - 2 * states[some] @ states.T
+        distance[np.arange(len(some)), some] = np.inf
+        return line_fit(rest[some], rest[distance.argmin(axis=1)]).correlation > 0.5

@@ -1,0 +1,82 @@
+"""The diagnosis of agents of CartPole, by their exact values with one thing changed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import keras_pendulum as kp
+from keras_pendulum.environments.cartpole import CartPole
+from keras_pendulum.optimum.cartpole import CartPoleSolution
+
+EXACT = CartPoleSolution(CartPole())
+TABLE = EXACT.table(0.95)
+FORCES = np.array([-10.0, 10.0])
+
+
+def exact_values(observations: Any) -> Any:
+    """Returns the exact Q-values [B, 2] for γ = 0.95."""
+    return EXACT.exact_q(TABLE, 0.95, EXACT.states_of(observations), FORCES)
+
+
+def first(values: Any, **options: Any) -> str:
+    agent = kp.q_function(lambda o: values(o[:, :4]), name="agent")
+    found = kp.diagnose(agent, environment="CartPole-v1", discount=0.95, **options).findings
+    return found[0].title if found else "no finding"
+
+
+@pytest.mark.parametrize(
+    ("finding", "values"),
+    [
+        ("no finding", exact_values),
+        ("torque-map", lambda o: exact_values(o)[:, ::-1]),
+        ("observation-map", lambda o: exact_values(o[:, [2, 3, 0, 1]])),
+        ("missing-end", lambda o: 20 + 0.001 * np.sin(o[:, :2])),
+        ("no-bootstrapping", lambda o: 1 + 0.001 * np.sin(o[:, :2])),
+        ("wrong-loss (batch-broadcast)", lambda o: 9 + 0.001 * np.sin(o[:, :2])),
+        ("broken-network", lambda o: np.full((len(o), 2), np.nan)),
+    ],
+)
+def test_changed_values_are_named(finding: str, values: Any) -> None:
+    assert first(values) == finding
+
+
+def transitions(episodes: int = 40) -> list[Any]:
+    """Returns the steps of random play: s, a, r, s′, terminated."""
+    random, rows = np.random.RandomState(0), []
+    env = CartPole().make_env()
+    for seed in range(episodes):
+        observation, ended = env.reset(seed=seed)[0], False
+        while not ended:
+            action = random.randint(2)
+            following, reward, ended, *_ = env.step(action)
+            rows.append((observation, action, reward, following, ended))
+            observation = following
+    return [np.array(column) for column in zip(*rows, strict=True)]
+
+
+@pytest.mark.parametrize(
+    ("finding", "change"),
+    [
+        ("torque-map", lambda s, a, r, n, d: (s, 1 - a, r, n, d)),
+        ("missing-end", lambda s, a, r, n, d: (s, a, r, n, np.zeros_like(d))),
+        ("truncation-as-end", lambda s, a, r, n, d: (s, a, r, n, d | (np.arange(len(d)) == 5))),
+        ("misaligned-transitions", lambda s, a, r, n, d: (s, a, r, np.roll(n, 1, axis=0), d)),
+        ("reward-sign", lambda s, a, r, n, d: (s, a, -r, n, d)),
+    ],
+)
+def test_transitions_show_the_mistake(finding: str, change: Any) -> None:
+    def useless(observations: Any) -> Any:
+        return 10 + 5 * np.sin(7 * observations[:, :2])
+
+    assert finding in first(useless, transitions=change(*transitions()))
+    assert finding not in first(useless, transitions=transitions())
+
+
+def test_shipped_agent_has_no_finding() -> None:
+    diagnosis = kp.diagnose("cartpole")
+    assert diagnosis.findings == []
+    assert diagnosis.as_json()["environment"] == "CartPole-v1"
+    assert diagnosis.figure().axes

@@ -1,0 +1,346 @@
+"""Tests of what people hand in beside their network: a record, and their replay buffer."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from exact_agent import NOISE, PENDULUM, coarse_value, diagnose_values, exact_values, measure
+from gymnasium.wrappers import TransformAction, TransformReward
+from recorded_runs import buffer_of, record_run
+
+import keras_pendulum as kp
+from keras_pendulum.diagnosis import run_rules, transition_rules
+from keras_pendulum.diagnosis.findings import RULES, find_in_record
+from keras_pendulum.diagnosis.record_sources import read_actions, transitions_of
+from keras_pendulum.diagnosis.run_record import make_record
+from keras_pendulum.diagnosis.stored_rewards import StoredRewards
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.optimum import pendulum
+from keras_pendulum.optimum.dynamics import TORQUES
+
+
+class Row(NamedTuple):
+    state: Any
+    action: Any
+    reward: Any
+    next_state: Any
+    done: Any
+
+
+def turn_reward(reward: Any) -> Any:
+    return -reward
+
+
+def clip_reward(reward: Any) -> Any:
+    return max(reward, -1.0)
+
+
+@pytest.fixture(autouse=True)
+def _coarse_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pendulum, "discounted_value", coarse_value)
+
+
+@pytest.fixture(scope="module")
+def run() -> Any:
+    return record_run(episodes=30, steps=100)
+
+
+def bad_values(observations: Any) -> Any:
+    """Returns exact values with so much noise that the agent plays badly."""
+    return exact_values(observations) + 8 * np.sin(9 * observations @ NOISE)
+
+
+ROOMS = run_rules.__name__, transition_rules.__name__
+RECORD_RULES = [rule for rule in RULES if rule.__module__ in ROOMS]
+
+
+def first(record: Any = None, transitions: Any = None) -> str:
+    """Returns what the record of a bad agent shows first."""
+    measured = measure(bad_values, make_record(record, transitions, TORQUES, PENDULUM))
+    found = (rule(measured) for rule in [*RECORD_RULES, run_rules.unsteady_return])
+    return next((finding.title for finding in found if finding is not None), "nothing")
+
+
+LAYOUTS: dict[str, Callable[[Any], Any]] = {
+    "arrays": lambda b: b,
+    "list of arrays": list,
+    "one more axis": lambda b: (b[0][:, None], b[1][:, None], b[2][:, None], b[3][:, None], b[4]),
+    "columns [N, 3, 1]": lambda b: (b[0][..., None], b[1], b[2], b[3][..., None], b[4]),
+    "lists": lambda b: [each.tolist() for each in b],
+    "rows": lambda b: list(zip(*b, strict=True)),
+    "deque of named rows": lambda b: deque(Row(*row) for row in zip(*b, strict=True)),
+    "rows with actions [1]": lambda b: [
+        (s[None], [a], [r], n[None], int(d)) for s, a, r, n, d in zip(*b, strict=True)
+    ],
+    "tensors": lambda b: [torch.from_numpy(np.asarray(each)) for each in b],
+    "rows of tensors": lambda b: [
+        tuple(torch.from_numpy(np.asarray(each)) for each in row) for row in zip(*b, strict=True)
+    ],
+    "float indices": lambda b: (b[0], b[1].astype(np.float32), *b[2:4], b[4].astype(np.float32)),
+    "torques": lambda b: (b[0], TORQUES[b[1]].astype(np.float32), *b[2:]),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_layouts_of_a_replay_buffer_are_the_same(layout: str, run: Any) -> None:
+    expected = make_record(None, buffer_of(run), TORQUES, PENDULUM)
+    found = make_record(None, LAYOUTS[layout](buffer_of(run)), TORQUES, PENDULUM)
+    assert expected is not None and found is not None
+    for column, other in zip(found.replay, expected.replay, strict=True):
+        assert np.array_equal(column, other) and column.dtype == other.dtype
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_few_rows_are_not_taken_for_columns(count: int, run: Any) -> None:
+    rows = list(zip(*buffer_of(run), strict=True))[:count]
+    assert transitions_of(rows, Pendulum()).observation.shape == (count, 3)
+    assert transitions_of(
+        [np.array(each) for each in zip(*rows, strict=True)], Pendulum()
+    ).reward.shape == (count,)
+
+
+def broken(run: Any, place: int, value: Any) -> list[Any]:
+    columns = list(buffer_of(run))
+    columns[place] = value
+    return columns
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda run: 3, "transitions is a int; expected .s, a, r, s′, done.: five arrays"),
+        (lambda run: [], "transitions has 0 items|transitions is empty"),
+        (lambda run: buffer_of(run)[:4], "transitions has 4 items"),
+        (lambda run: broken(run, 0, np.zeros((3000, 4))), "observation has the shape .3000, 4."),
+        (lambda run: broken(run, 2, np.zeros(7)), "reward has the shape .7."),
+        (lambda run: broken(run, 1, ["left"] * 3000), "action is not an array of numbers"),
+        (lambda run: broken(run, 2, np.full(3000, np.nan)), "NaN or infinite numbers"),
+        (lambda run: broken(run, 1, np.full(3000, 41)), "the actions are from 41 to 41; .*0 to 40"),
+        (lambda run: broken(run, 1, np.full(3000, 9.5)), "from 9.5 to 9.5; expected indices"),
+        (lambda run: broken(run, 4, np.full(3000, 0.5)), "done has other values than 0 and 1"),
+        (lambda run: broken(run, 0, 0.5 * buffer_of(run)[0]), r"cos² \+ sin² is 0.25, not 1"),
+    ],
+)
+def test_wrong_transitions_are_refused_in_one_line(change: Any, message: str, run: Any) -> None:
+    with pytest.raises((kp.ConfigError, TypeError), match=message) as caught:
+        make_record(None, change(run), TORQUES, PENDULUM)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("actions", "torques", "indices"),
+    [
+        ([0, 1, 2], [-2, 0, 2], [0, 1, 2]),
+        ([0.0, 2.0, -2.0], [-2, 0, 2], [1, 2, 0]),
+        ([-2, 0, 2], [-2, 0, 2], [0, 1, 2]),
+        ([0.0, 1.0, 2.0], [-2, 0, 2], [0, 1, 2]),  # 1 N·m is not a torque of the agent
+        ([0.0, 1.0, 2.0], [-2, -1, 0, 1, 2], [2, 3, 4]),
+        ([0, 1, 2], [-2, -1, 0, 1, 2], [0, 1, 2]),
+    ],
+)
+def test_indices_and_torques_are_told_apart(actions: Any, torques: Any, indices: Any) -> None:
+    found, torque = read_actions(np.array(actions), np.array(torques, float), "record")
+    assert found.tolist() == indices
+    assert torque is None or torque.tolist() == actions
+
+
+def test_right_run_of_a_bad_agent_gets_no_fault(run: Any) -> None:
+    assert first(run, buffer_of(run)) == "nothing"
+    record = make_record(run, buffer_of(run), TORQUES, PENDULUM)
+    assert diagnose_values(bad_values, record).findings[0].name == "not-converged"
+
+
+def stored(run: Any, **fields: Any) -> Any:
+    names = ("s", "a", "r", "next", "done")
+    columns = dict(zip(names, buffer_of(run), strict=True))
+    return [np.asarray(fields.get(name, columns[name])) for name in names]
+
+
+def greedy(run: Any, share: float) -> Any:
+    """Returns the stored actions, some of them replaced by the agent's greedy one."""
+    s, a, *_ = buffer_of(run)
+    replaced = np.random.RandomState(0).random_sample(len(a)) < share
+    return np.where(replaced, bad_values(s).argmax(axis=1), a)
+
+
+def truncated(run: Any) -> Any:
+    ends = np.zeros(len(run.steps.first), bool)
+    ends[np.append(np.flatnonzero(run.steps.first)[1:] - 1, -1)] = True
+    return ends
+
+
+@pytest.mark.parametrize(
+    ("finding", "change"),
+    [
+        ("misaligned-transitions (greedy-stored)", lambda run: stored(run, a=greedy(run, 0.3))),
+        ("misaligned-transitions (greedy-stored)", lambda run: stored(run, a=greedy(run, 0.05))),
+        ("misaligned-transitions", lambda run: stored(run, a=np.roll(buffer_of(run)[1], 1))),
+        ("torque-map", lambda run: stored(run, a=(buffer_of(run)[1] + 1) % 41)),
+        ("torque-map", lambda run: stored(run, a=40 - buffer_of(run)[1])),
+        ("misaligned-transitions (same-state)", lambda run: stored(run, next=buffer_of(run)[0])),
+        (
+            "misaligned-transitions (same-state)",
+            lambda run: stored(run, s=np.repeat(buffer_of(run)[0][::100], 100, axis=0)),
+        ),
+        ("no-bootstrapping (truncation)", lambda run: stored(run, done=truncated(run))),
+        ("no-bootstrapping", lambda run: stored(run, done=np.ones(3000))),
+        ("reward-sign", lambda run: stored(run, r=-buffer_of(run)[2])),
+        ("reward-scale", lambda run: stored(run, r=buffer_of(run)[2] / 16)),
+        ("other-reward", lambda run: stored(run, r=np.maximum(buffer_of(run)[2], -1))),
+        ("other-reward", lambda run: stored(run, r=np.where(buffer_of(run)[0][:, 0] > 0.9, 1, 0))),
+        ("forgetting (no-replay)", lambda run: [each[-64:] for each in buffer_of(run)]),
+    ],
+)
+def test_transitions_show_the_mistake(finding: str, change: Any, run: Any) -> None:
+    assert first(None, change(run)) == finding
+
+
+@pytest.mark.parametrize("share", [0.8, 1.2])
+def test_declared_reward_scale_is_that_of_the_buffer(share: float, run: Any) -> None:
+    rewards = stored(run, r=0.1 * share * buffer_of(run)[2])
+    record = make_record(None, rewards, TORQUES, PENDULUM)
+    assert record is not None
+    slope, _, correlation = StoredRewards.of(record, PENDULUM, TORQUES, 0.1).fit
+    assert (correlation, slope) == pytest.approx((1, share), abs=1e-3)
+
+
+def test_small_buffer_is_compared_with_the_record(run: Any) -> None:
+    small = [each[-900:] for each in buffer_of(run)]
+    assert first(run, small) == "forgetting"
+    assert first(None, small) == "nothing"  # the run may have had 900 steps
+
+
+def test_batch_drawn_at_random_is_no_missing_replay(run: Any) -> None:
+    rows = np.random.RandomState(0).permutation(3000)[:64]
+    assert first(None, [each[rows] for each in buffer_of(run)]) == "nothing"
+
+
+@pytest.mark.parametrize(
+    ("finding", "options"),
+    [
+        ("exploration", {"epsilon": lambda done: 1.0}),
+        ("exploration", {"epsilon": lambda done: done}),
+        ("exploration", {"epsilon": lambda done: 0.01}),
+        ("narrow-starts", {"reset": {"x_init": 0.1, "y_init": 0.1}, "steps": 10, "episodes": 300}),
+        ("other-gravity", {"gravity": 10.0}),
+        (
+            "other-reward",
+            {"wrap": lambda env: TransformReward(env, clip_reward)},
+        ),
+        (
+            "reward-sign",
+            {"wrap": lambda env: TransformReward(env, turn_reward)},
+        ),
+        (
+            "torque-map",
+            {"wrap": lambda env: TransformAction(env, np.negative, None)},
+        ),
+    ],
+)
+def test_record_shows_the_mistake(finding: str, options: Any) -> None:
+    assert first(record_run(**({"episodes": 30} | options))) == finding
+
+
+def test_actions_that_answer_the_first_observation_are_an_old_state() -> None:
+    first_seen: list[Any] = []
+
+    def act(observation: Any) -> float:
+        if not first_seen:
+            first_seen.append(observation)
+        return float(TORQUES[bad_values(first_seen[-1][None])[0].argmax()])
+
+    class Forget(gymnasium.Wrapper[Any, Any, Any, Any]):
+        def reset(self, **options: Any) -> Any:
+            first_seen.clear()
+            return super().reset(**options)
+
+    assert first(record_run(act, wrap=Forget, episodes=40)) == "misaligned-transitions (same-state)"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda s: s[:, [1, 0, 2]],
+        lambda s: s * [1, 1, -1],
+        lambda s: s * [1, 1, 1 / 8],
+        lambda s: s[:, [2, 0, 1]],
+    ],
+    ids=["sine first", "speed reversed", "speed over 8", "speed first"],
+)
+def test_other_observations_of_the_buffer_are_understood(change: Any, run: Any) -> None:
+    """The agent may change them itself, so only the rest is judged."""
+    s, a, r, after, done = buffer_of(run)
+    record = make_record(None, (change(s), a, r, change(after), done), TORQUES, PENDULUM)
+    assert record is not None
+    assert record.replay.observation == pytest.approx(s, abs=1e-6)
+    assert measure(bad_values, record).motion.obeying() > 0.99
+
+
+def push_upright(observation: Any) -> float:
+    return float(np.clip(-10 * observation[1] - 2 * observation[2], -2, 2))
+
+
+def falls(done: float) -> float:
+    return max(0.05, 1 - 4 * done)
+
+
+def test_run_that_was_better_before_its_end_forgot() -> None:
+    steps = count()
+    act = lambda o: push_upright(o) if next(steps) < 2500 else 2.0  # noqa: E731
+    assert first(record_run(act, episodes=50, epsilon=falls)) == "not-converged (forgot)"
+    assert first(record_run(lambda o: 2.0, episodes=50, epsilon=falls)) == "nothing"
+
+
+def test_run_whose_episodes_alternate_jumps() -> None:
+    steps = count()
+    act = lambda o: push_upright(o) if next(steps) // 100 % 2 else 2.0  # noqa: E731
+    assert first(record_run(act, episodes=50, epsilon=falls)) == "not-converged (jumps)"
+    assert first(record_run(push_upright, episodes=50, epsilon=falls)) == "nothing"
+
+
+def test_policy_without_values_is_judged_by_its_record(run: Any) -> None:
+    def found(record: Any) -> list[str]:
+        measured = measure(exact_values, make_record(record, None, None, PENDULUM), bare=True)
+        return [finding.title for finding in find_in_record(measured)]
+
+    assert found(run) == []
+    assert found(record_run(wrap=lambda env: TransformReward(env, turn_reward))) == ["reward-sign"]
+    narrow = record_run(reset={"x_init": 0.1, "y_init": 0.1}, steps=10, episodes=300)
+    assert found(narrow) == ["narrow-starts"]
+
+
+def test_record_may_be_a_file_and_on_the_command_line(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from keras_pendulum.diagnosis.__main__ import main
+
+    monkeypatch.chdir(tmp_path)
+    record_run(episodes=30, epsilon=lambda done: 1.0).save("run.npz")
+    Path("mine.py").write_text(
+        "import numpy as np\n"
+        "import keras_pendulum as kp\n"
+        "noise = np.random.RandomState(0).normal(size=(3, 41))\n"
+        "q = kp.q_function(lambda x: -30 + 9 * np.sin(9 * x @ noise))\n",
+        encoding="utf-8",
+    )
+    words = ["mine.py:q", "--gravity", "1", "--discount", "0.9", "--record"]
+    assert main([*words, "run.npz"]) == 0
+    out = capsys.readouterr().out
+    assert "exploration" in out and "Not determined" not in out
+    assert main([*words, "no.npz"]) == 2
+    assert capsys.readouterr().err == "error: cannot read no.npz: No such file or directory\n"
+
+
+def test_run_folder_has_a_record_of_its_own(run: Any, tmp_path: Path) -> None:
+    config = kp.preset("reference", episodes=1, hidden_units=(8,))
+    kp.train_dqn(config, tmp_path / "run")
+    with pytest.raises(kp.ConfigError, match="is a run folder, which has a record of its own"):
+        kp.diagnose(tmp_path / "run", record=run)
