@@ -10,11 +10,18 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from keras_pendulum.cli import OneLineParser, add_activation_flag, nonempty_path, run_command
+from keras_pendulum.cli import (
+    OneLineParser,
+    add_activation_flag,
+    add_environment_flag,
+    nonempty_path,
+    run_command,
+)
 from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.config.settings import validate_setting
 from keras_pendulum.display import require_display
-from keras_pendulum.environments.pendulum import Pendulum, require_pendulum
+from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.tasks import declared_task
 from keras_pendulum.play.control_c import control_c
 from keras_pendulum.storage.find_weights import find_weights
 from keras_pendulum.storage.shipped_weights import shipped_names
@@ -31,9 +38,13 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     """Plays the game as the command line says; returns the exit status."""
     parser = OneLineParser(
         prog=prog,
-        description="Drive the pendulum by hand; --against then shows a policy on the same start.",
-        epilog="Keys: j or left -2 N·m, l or right +2, k or down 0; r restarts, ESC leaves.",
+        description="Drive the pendulum or CartPole by hand; --against then shows a policy on the "
+        "same start.",
+        epilog="Keys: j or left -2 N·m (CartPole: push left), l or right +2 (push right), k or "
+        "down 0 (pushes alternate); h switches between keys that act until the next one and while "
+        "they are held; r restarts, ESC leaves.",
     )
+    add_environment_flag(parser)
     parser.add_argument(
         "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
     )
@@ -54,8 +65,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 
 def _play(arguments: argparse.Namespace) -> int:
-    gravity, seed = arguments.gravity, arguments.seed
-    task = Pendulum().with_gravity(gravity)
+    environment, gravity, seed = arguments.environment, arguments.gravity, arguments.seed
+    task = declared_task(environment or "Pendulum-v1").with_gravity(gravity)
     if seed is not None:
         seed = validate_setting("seed", seed)
     file = find_weights(arguments.against) if arguments.against is not None else None
@@ -69,7 +80,9 @@ def _play(arguments: argparse.Namespace) -> int:
             if file is not None:
                 window.show_loading(f"Loading the policy of {file.name} …")
                 policy = _load_policy(file, arguments.activation)
-                task = require_pendulum(policy.task, f"{file}:").with_gravity(gravity)
+                if environment:
+                    policy = policy.with_environment(environment)
+                task = policy.task.with_gravity(gravity)
             return _run_game(window, check_control_c, task, seed, policy, arguments.print_steps)
         finally:
             window.close()
@@ -87,21 +100,22 @@ def _load_policy(file: Path, activation: str | None) -> Policy:
 def _run_game(
     window: Window,
     check_control_c: Callable[[], None],
-    task: Pendulum,
+    task: Task,
     seed: int | None,
     policy: Policy | None,
     print_steps: bool,
 ) -> int:
     from keras_pendulum.optimum.solution import USUAL_SEEDS
     from keras_pendulum.play.game import Game
+    from keras_pendulum.play.played_tasks import played_task
     from keras_pendulum.play.window import play
 
     if seed is None:
         # The optimal returns of these seeds are shipped, or cached after their first use.
         seed = random.choice(USUAL_SEEDS)
-    window.show_loading(f"Loading the best possible returns at g = {task.gravity:g} m/s² …")
+    window.show_loading(f"Loading the best possible returns of {task.name} …")
     print_line = functools.partial(print, flush=True)
-    game = Game(task, seed, policy, print_line=print_line, print_steps=print_steps)
+    game = Game(played_task(task), seed, policy, print_line=print_line, print_steps=print_steps)
     try:
         play(game, window, check_control_c)
     finally:

@@ -1,4 +1,4 @@
-"""The game: the player drives the pendulum, then a policy drives it from the same start.
+"""The game: the player drives, then a policy drives from the same start.
 
 A `Game` has no window and no clock. Its caller passes it the pressed keys, calls `advance` once per
 frame, and draws its `view`.
@@ -10,29 +10,29 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
-from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.optimum.solution import USUAL_SEEDS
 from keras_pendulum.optimum.solutions import solution
 from keras_pendulum.play.episode import ManualEpisode
+from keras_pendulum.play.played_task import Observation, PlayedTask
 
-FRAMES_PER_SECOND = 20  # a step of the environment is 0.05 s
-READY_FRAMES = 2 * FRAMES_PER_SECOND  # the player sees the start before the pendulum moves
+FRAMES_PER_SECOND = 20  # each is a step: of 0.05 s for the pendulum
+READY_FRAMES = 2 * FRAMES_PER_SECOND  # the player sees the start before anything moves
 
 
 class Key(Enum):
     """The meaning of a key."""
 
-    CLOCKWISE = auto()
-    COUNTERCLOCKWISE = auto()
-    NO_TORQUE = auto()
+    NEGATIVE = auto()  # effort
+    POSITIVE = auto()
+    NEUTRAL = auto()
+    HOLD = auto()  # switches between keys that act until the next one, and while they are held
     RESTART = auto()
     CONTINUE = auto()
     LEAVE = auto()
 
 
-TORQUES = {Key.CLOCKWISE: -MAX_TORQUE, Key.COUNTERCLOCKWISE: MAX_TORQUE, Key.NO_TORQUE: 0.0}  # N·m
+DIRECTIONS = {Key.NEGATIVE: -1, Key.POSITIVE: 1, Key.NEUTRAL: 0}
 
 
 @dataclass(frozen=True)
@@ -40,14 +40,16 @@ class View:
     """The content of one frame."""
 
     title: str
-    gravity: float  # m/s²
+    task: PlayedTask
+    held: bool  # whether a key acts only while it is held
     seed: int
-    torque: float  # N·m, of the last step
+    observation: Observation  # [D]
+    effort: float  # of the last step
     step: int
     reward: float  # of the last step
     total_reward: float  # the return so far
     optimal_return: float
-    message: str  # over the picture; empty while the pendulum moves
+    message: str  # over the picture; empty while an episode runs
     key_help: str
     path: Sequence[tuple[float, float]]  # θ (rad) and θ̇ (rad/s) so far; the last one is present
     earlier_path: Sequence[tuple[float, float]]  # the player's, while the agent drives
@@ -75,7 +77,7 @@ _KEY_HELP = {
 
 
 class Game:
-    """A series of episodes that ends when the player leaves.
+    """A series of episodes of a task that ends when the player leaves.
 
     The player drives first. Then the agent, if any, drives from the same start. Then the game
     prints the score.
@@ -83,7 +85,7 @@ class Game:
     The constructor takes some 20 s if the optimal return of the first start is not stored yet.
 
     Args:
-        task: the pendulum.
+        task: as the game plays it.
         seed: of the first start.
         policy: drives after the player, if there is one.
         print_line: called with each line of output.
@@ -92,7 +94,7 @@ class Game:
 
     def __init__(
         self,
-        task: Pendulum,
+        task: PlayedTask,
         seed: int,
         policy: Policy | None = None,
         *,
@@ -101,8 +103,8 @@ class Game:
     ) -> None:
         self._task, self._policy, self._print_line = task, policy, print_line
         self._print_steps = print_steps
-        self._env = task.make_env()
-        self.finished = False
+        self._env = task.task.make_env()
+        self.finished = self._held = False
         self._stage = _Stage.READY
         self._start(seed)
 
@@ -113,8 +115,11 @@ class Game:
             self._leave()
         elif key is Key.RESTART:
             self._restart()
-        elif key in TORQUES and stage in (_Stage.READY, _Stage.PLAYER):
-            self._torque = TORQUES[key]
+        elif key is Key.HOLD:
+            self._held = not self._held
+            self._direction = 0
+        elif key in DIRECTIONS and stage in (_Stage.READY, _Stage.PLAYER):
+            self._direction = DIRECTIONS[key]
             self._stage = _Stage.PLAYER
         elif key is Key.CONTINUE and stage is _Stage.READY:
             self._stage = _Stage.PLAYER
@@ -124,6 +129,11 @@ class Game:
         elif key is Key.CONTINUE and stage is _Stage.SCORE:
             # Stays within the seeds whose optimal returns are stored together.
             self._start((self._seed + 1) % len(USUAL_SEEDS))
+
+    def release(self, key: Key) -> None:
+        """Ends the effort of a key that is released, where keys act only while they are held."""
+        if self._held and DIRECTIONS.get(key) == self._direction:
+            self._direction = 0
 
     def advance(self) -> None:
         """Advances by one frame; the player or the agent takes one step."""
@@ -142,9 +152,11 @@ class Game:
         episode = self._episode
         return View(
             title=_TITLES[self._stage],
-            gravity=self._task.gravity,
+            task=self._task,
+            held=self._held,
             seed=self._seed,
-            torque=episode.torque,
+            observation=episode.observation,
+            effort=episode.effort,
             step=episode.steps,
             reward=episode.reward,
             total_reward=episode.total_reward,
@@ -161,19 +173,22 @@ class Game:
 
     def _start(self, seed: int) -> None:
         self._seed = seed
-        self._optimal_return = float(solution(self._task).best_returns([seed])[0])
-        self._print_line(f"Start: seed {seed}, g = {self._task.gravity:g}")
+        self._optimal_return = float(solution(self._task.task).best_returns([seed])[0])
+        self._print_line(f"Start: seed {seed}, {self._task.task.name}")
         self._restart()
 
     def _restart(self) -> None:
         # The episode on the screen is the player's until the agent drives.
-        self._player = self._episode = ManualEpisode(self._env, self._seed)
-        self._torque = 0.0
+        self._player = self._episode = self._new_episode()
+        self._direction = 0
         self._stage = _Stage.READY
         self._frames_left = READY_FRAMES
 
+    def _new_episode(self) -> ManualEpisode:
+        return ManualEpisode(self._task, self._env, self._seed)
+
     def _step_player(self) -> None:
-        self._player.step(self._torque)
+        self._player.step(self._task.effort_of(self._direction, self._player.steps))
         if self._print_steps:
             self._print_line(str(self._player))
         if self._player.done:
@@ -181,13 +196,13 @@ class Game:
                 self._show_score()
             else:
                 self._policy.reset()
-                self._episode = ManualEpisode(self._env, self._seed)
+                self._episode = self._new_episode()
                 self._stage = _Stage.AGENT
 
     def _step_agent(self) -> None:
         assert self._policy is not None
         action = self._policy.action(self._episode.observation)
-        self._episode.step(self._task.torque_of(action))
+        self._episode.step(self._task.effort_of_action(action))
         if self._episode.done:
             self._show_score()
 
@@ -202,10 +217,12 @@ class Game:
 
     def _score(self) -> str:
         """Returns the returns of the finished episodes, or the player's return so far."""
-        player = f"you {self._player.total_reward:.1f}"
+        show = self._task.show_return
+        player = f"you {show(self._player.total_reward)}"
         if not self._player.done:
-            return f"{player} after {self._player.steps} of {STEPS_PER_EPISODE} steps"
+            steps = self._task.task.steps_per_episode
+            return f"{player} after {self._player.steps} of {steps} steps"
         parts = [player]
         if self._episode is not self._player and self._episode.done:
-            parts.append(f"agent {self._episode.total_reward:.1f}")
-        return " · ".join([*parts, f"best possible {self._optimal_return:.1f}"])
+            parts.append(f"agent {show(self._episode.total_reward)}")
+        return " · ".join([*parts, f"best possible {show(self._optimal_return)}"])

@@ -7,8 +7,6 @@ from collections.abc import Callable
 
 import pygame
 
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE
-from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import UserError
 from keras_pendulum.figures.style import rgb, torque_color
 from keras_pendulum.play.drawing import (
@@ -19,19 +17,19 @@ from keras_pendulum.play.drawing import (
     PAPER,
     WHITE,
     Writer,
-    draw_pendulum,
     draw_portrait,
 )
 from keras_pendulum.play.game import FRAMES_PER_SECOND, Game, Key, View
 
 KEYS = {
-    pygame.K_j: Key.CLOCKWISE,
-    pygame.K_LEFT: Key.CLOCKWISE,
-    pygame.K_l: Key.COUNTERCLOCKWISE,
-    pygame.K_RIGHT: Key.COUNTERCLOCKWISE,
-    pygame.K_k: Key.NO_TORQUE,
-    pygame.K_DOWN: Key.NO_TORQUE,
-    pygame.K_UP: Key.NO_TORQUE,
+    pygame.K_j: Key.NEGATIVE,
+    pygame.K_LEFT: Key.NEGATIVE,
+    pygame.K_l: Key.POSITIVE,
+    pygame.K_RIGHT: Key.POSITIVE,
+    pygame.K_k: Key.NEUTRAL,
+    pygame.K_DOWN: Key.NEUTRAL,
+    pygame.K_UP: Key.NEUTRAL,
+    pygame.K_h: Key.HOLD,
     pygame.K_r: Key.RESTART,
     pygame.K_RETURN: Key.CONTINUE,
     pygame.K_KP_ENTER: Key.CONTINUE,
@@ -41,17 +39,16 @@ KEYS = {
 
 _SIZE = _WIDTH, _HEIGHT = 1000, 640
 _TOP = 48  # height of the title
-_SIDE = 456  # of the pendulum, and of the phase portrait beside it
+_SIDE = 456  # of the picture, and of the phase portrait beside it
 _LEFT, _RIGHT = pygame.Rect(0, _TOP, 500, _SIDE), pygame.Rect(500, _TOP, 500, _SIDE)
-_BAR = pygame.Rect(110, _TOP + _SIDE + 16, 280, 18)  # the torque, below the pendulum
+_BAR = pygame.Rect(110, _TOP + _SIDE + 16, 280, 18)  # the effort, below the picture
 
 
 class Window:
     """A window on the screen.
 
     Args:
-        wait_for_frame: waits until the next frame is due; the default is 20 frames per second, the
-            speed of the pendulum.
+        wait_for_frame: waits until the next frame is due; the default is 20 frames per second.
 
     Raises UserError when the window cannot be opened.
     """
@@ -69,15 +66,18 @@ class Window:
         pygame.key.stop_text_input()  # an input method would take the letters
         self._write = Writer(self._screen).write
 
-    def pressed_keys(self) -> list[Key]:
-        """Returns the keys pressed since the last call; a closed window counts as LEAVE."""
-        keys = []
+    def key_events(self) -> list[tuple[Key, bool]]:
+        """Returns the keys since the last call, and whether they were pressed or released.
+
+        A closed window counts as LEAVE.
+        """
+        events = []
         for event in pygame.event.get():
             if event.type == pygame.QUIT:
-                keys.append(Key.LEAVE)
-            elif event.type == pygame.KEYDOWN and event.key in KEYS:
-                keys.append(KEYS[event.key])
-        return keys
+                events.append((Key.LEAVE, True))
+            elif event.type in (pygame.KEYDOWN, pygame.KEYUP) and event.key in KEYS:
+                events.append((KEYS[event.key], event.type == pygame.KEYDOWN))
+        return events
 
     def show_loading(self, text: str) -> None:
         """Draws a line of text."""
@@ -94,44 +94,46 @@ class Window:
         """Draws a view and waits until the next frame is due."""
         self._screen.fill(PAPER)
         self._write(view.title, (16, 13), LARGE)
-        start = f"g = {view.gravity:g} m/s²      start of seed {view.seed}"
+        acts = "while it is held" if view.held else "until the next one"
+        self._write(f"a key acts {acts} (h: switch)", (_WIDTH // 2 - 90, 16), align=0.5)
+        start = f"{view.task.setting}      start of seed {view.seed}"
         self._write(start, (_WIDTH - 16, 16), align=1.0)
-        angle, _ = view.path[-1]
         pygame.draw.rect(self._screen, WHITE, (0, _TOP, _WIDTH, _SIDE))
-        self._screen.blit(draw_pendulum(angle, view.torque, _LEFT.size), _LEFT)
-        draw_portrait(self._screen, self._write, _RIGHT, view.path, view.earlier_path)
+        self._screen.blit(view.task.draw(view.observation, view.effort, _LEFT.size), _LEFT)
+        draw_portrait(self._screen, self._write, _RIGHT, view.task, view.path, view.earlier_path)
         # A strip along the lower edge shows the elapsed share of the episode.
-        width = _WIDTH * view.step // STEPS_PER_EPISODE
+        width = _WIDTH * view.step // view.task.task.steps_per_episode
         pygame.draw.rect(self._screen, LINE, (0, _TOP + _SIDE - 4, width, 4))
         if view.message:
             self._write(view.message, (_LEFT.centerx, _TOP + 6), align=0.5)
-        self._draw_torque(view.torque)
+        self._draw_effort(view)
         self._draw_numbers(view)
-        keys = "j or Left: -2 N·m      k or Down: 0      l or Right: +2 N·m"
-        self._write(keys, (16, _HEIGHT - 30))
+        self._write(view.task.keys, (16, _HEIGHT - 30))
         self._write(view.key_help, (_WIDTH - 16, _HEIGHT - 30), align=1.0)
         pygame.display.flip()
         self._wait_for_frame()
 
-    def _draw_torque(self, torque: float) -> None:
-        """Draws a bar from the middle; a counterclockwise torque points to the right."""
+    def _draw_effort(self, view: View) -> None:
+        """Draws a bar from the middle; a positive effort points to the right."""
         pygame.draw.rect(self._screen, WHITE, _BAR)
-        length = round(abs(torque) / MAX_TORQUE * _BAR.width / 2)
-        left = _BAR.centerx - (length if torque < 0 else 0)
+        length = round(abs(view.effort) / view.task.largest_effort * _BAR.width / 2)
+        left = _BAR.centerx - (length if view.effort < 0 else 0)
         place = (left, _BAR.top, length, _BAR.height)
-        pygame.draw.rect(self._screen, rgb(torque_color(torque)), place)
+        pygame.draw.rect(self._screen, rgb(torque_color(view.effort)), place)
         pygame.draw.rect(self._screen, LINE, _BAR, width=1)
         pygame.draw.line(self._screen, INK, _BAR.midtop, _BAR.midbottom, width=2)
-        self._write("clockwise", (_BAR.left - 10, _BAR.top), align=1.0)
-        self._write("counterclockwise", (_BAR.right + 10, _BAR.top))
+        negative, positive = view.task.directions
+        self._write(negative, (_BAR.left - 10, _BAR.top), align=1.0)
+        self._write(positive, (_BAR.right + 10, _BAR.top))
 
     def _draw_numbers(self, view: View) -> None:
+        task = view.task
         numbers = {
-            "torque": f"{view.torque:+.1f} N·m" if view.torque else "0 N·m",
-            "step": f"{view.step} of {STEPS_PER_EPISODE}",
+            task.effort: f"{view.effort:+.1f} {task.unit}" if view.effort else f"0 {task.unit}",
+            "step": f"{view.step} of {task.task.steps_per_episode}",
             "reward": f"{view.reward:z.3f}",
-            "return": f"{view.total_reward:z.1f}",
-            "best possible": f"{view.optimal_return:z.1f}",
+            "return": task.show_return(view.total_reward),
+            "best possible": task.show_return(view.optimal_return),
         }
         width = _WIDTH / len(numbers)
         for i, (name, text) in enumerate(numbers.items()):
@@ -147,8 +149,8 @@ def play(game: Game, window: Window, check_interrupt: Callable[[], None]) -> Non
     """
     while True:
         check_interrupt()
-        for key in window.pressed_keys():
-            game.press(key)
+        for key, pressed in window.key_events():
+            (game.press if pressed else game.release)(key)
             if game.finished:
                 return
         game.advance()

@@ -20,7 +20,9 @@ import pytest
 from conftest import Command, Refusal, command_line, wait_for
 
 import keras_pendulum as kp
+from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
+from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.evaluate import __main__ as evaluate_command
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.sources import as_policy
@@ -29,21 +31,23 @@ from keras_pendulum.play import __main__ as play_command
 from keras_pendulum.play import drawing
 from keras_pendulum.play import window as window_module
 from keras_pendulum.play.control_c import control_c
-from keras_pendulum.play.drawing import INK, SMALL, Writer, draw_pendulum, draw_portrait
+from keras_pendulum.play.drawing import INK, SMALL, Writer, draw_portrait
 from keras_pendulum.play.episode import ManualEpisode
 from keras_pendulum.play.game import READY_FRAMES, Game, Key, View
+from keras_pendulum.play.pendulum import draw_pendulum
+from keras_pendulum.play.played_tasks import PLAYED_TASKS, played_task
 from keras_pendulum.play.window import Window, play
 
 NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
 CLOSED = "error: the window was closed before the end of the last episode\n"
-STEP = re.compile(r"Step: (\d+), Torque: (\S+), Reward: (\S+), Return: (\S+)")
+STEP = re.compile(r"Step: (\d+), (?:Torque|Force): (\S+), Reward: (\S+), Return: (\S+)")
 
 
 @dataclass
 class Player:
     """A clock that presses keys at the end of a frame, and then records the window's pixels."""
 
-    keys: Mapping[int, Any]  # frame -> a key of pygame, pygame.QUIT, or a list of them
+    keys: Mapping[int, Any]  # frame -> keys of pygame (negative: released) or pygame.QUIT
     lines: list[str] = field(default_factory=list)
     frames: int = 0
     pixels: dict[int, Any] = field(default_factory=dict)  # by frame [1000, 640, 3]
@@ -58,6 +62,8 @@ class Player:
             for key in np.atleast_1d(self.keys[self.frames]).tolist():
                 if key == pygame.QUIT:
                     pygame.event.post(pygame.event.Event(pygame.QUIT))
+                elif key < 0:
+                    pygame.event.post(pygame.event.Event(pygame.KEYUP, key=-key))
                 else:
                     pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key))
 
@@ -88,8 +94,8 @@ def play_game(keys: Mapping[int, Any], **settings: Any) -> Player:
     """Plays a whole game, pressing `keys[i]` at the end of frame i."""
     player = Player(keys)
     settings = {"seed": 3, "print_steps": True} | settings
-    task = Pendulum(settings.pop("gravity", 1.0))
-    game = Game(task, **settings, print_line=player.lines.append)
+    task = settings.pop("task", None) or Pendulum(settings.pop("gravity", 1.0))
+    game = Game(played_task(task), **settings, print_line=player.lines.append)
     play(game, Window(player.end_frame), lambda: None)
     game.close()
     return player
@@ -113,6 +119,64 @@ def test_key_starts_and_its_torque_acts_until_the_next_key(
     assert player.torques == [-2 if other == pygame.K_j else 2] * 3 + [torque] * 8
 
 
+def test_every_task_is_played() -> None:
+    assert PLAYED_TASKS.keys() == TASKS.keys()
+
+
+@pytest.mark.parametrize(("key", "force"), [("j", -10), ("RIGHT", 10)])
+def test_key_pushes_the_cart_and_without_one_the_pushes_alternate(
+    key: str, force: int, no_window: None
+) -> None:
+    keys = {1: getattr(pygame, f"K_{key}"), 5: pygame.K_k, 9: pygame.K_ESCAPE}
+    player = play_game(keys, task=CartPole(), seed=7)
+    assert player.torques == [force] * 4 + [-10, 10] * 2
+    assert player.lines[0] == "Start: seed 7, CartPole-v1"
+    assert player.scores == ["you 8 after 8 of 500 steps"]
+
+
+def test_pole_that_falls_ends_the_drive_and_the_network_balances_it(no_window: None) -> None:
+    agent = kp.load_policy("cartpole")
+    keys = {1: pygame.K_l, 40: pygame.K_RETURN, 45: pygame.K_ESCAPE}
+    player = play_game(keys, task=CartPole(), seed=7, policy=agent)
+    env = CartPole().make_env()
+    env.reset(seed=7)
+    steps = 1
+    while not env.step(1)[2]:
+        steps += 1
+    assert player.scores == [f"you {steps} · agent 500 · best possible 500"]
+    assert len(player.torques) == steps < 15
+
+
+@pytest.mark.parametrize("task", [Pendulum(), CartPole()], ids=["pendulum", "cartpole"])
+def test_held_key_acts_until_it_is_released(task: Any, no_window: None) -> None:
+    keys = {1: [pygame.K_h, pygame.K_l], 4: -pygame.K_l, 7: [pygame.K_j, -pygame.K_l]}
+    player = play_game({**keys, 9: [-pygame.K_j, pygame.K_ESCAPE]}, task=task)
+    push = played_task(task).largest_effort
+    without = [push, -push, push] if isinstance(task, CartPole) else [0.0] * 3
+    assert player.torques == [push] * 3 + without + [-push] * 2
+
+
+def test_released_key_acts_on_without_the_switch(no_window: None) -> None:
+    keys = {1: pygame.K_l, 3: -pygame.K_l, 5: [pygame.K_h, pygame.K_h], 7: pygame.K_ESCAPE}
+    assert play_game(keys).torques == [2] * 4 + [0] * 2
+
+
+@pytest.mark.parametrize(("angle", "side"), [(-0.2, "left"), (0.2, "right")])
+def test_pole_leans_to_the_side_of_its_angle(angle: float, side: str) -> None:
+    state = np.array([0, 0, angle, 0], np.float32)
+    pixels = pygame.surfarray.array3d(played_task(CartPole()).draw(state, 0.0, (500, 456)))
+    pole = (abs(pixels.astype(int) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
+    assert (pole[:250].sum() > 3 * pole[250:].sum()) == (side == "left")
+
+
+def test_force_that_cartpole_has_not_is_refused() -> None:
+    played = played_task(CartPole())
+    episode = ManualEpisode(played, CartPole().make_env(), seed=0)
+    for force in (0.0, 5.0, float("nan")):
+        with pytest.raises(ValueError, match="expected -10 or 10"):
+            episode.step(force)
+
+
 def test_game_starts_without_a_key_and_without_torque(no_window: None) -> None:
     player = play_game({READY_FRAMES + 5: pygame.K_ESCAPE})
     assert player.torques == [0] * 5
@@ -127,7 +191,7 @@ def test_score_is_the_sum_of_gymnasium_rewards(no_window: None) -> None:
     assert player.rewards == [round(reward, 3) for reward in rewards]
     optimum = kp.optimal_return(10.0, [7])[0]
     assert player.scores == [f"you {sum(rewards):.1f} · best possible {optimum:.1f}"]
-    assert player.lines[0] == "Start: seed 7, g = 10"
+    assert player.lines[0] == "Start: seed 7, Pendulum-v1, g = 10"
     assert player.lines[-1] == player.scores[0]  # leaving after the score prints nothing
 
 
@@ -145,7 +209,7 @@ def test_leaving_prints_the_score_so_far_and_takes_no_further_step(
     player = play_game({1: pygame.K_j, 11: [end, pygame.K_ESCAPE]}, print_steps=False)
     score = f"you {sum(gymnasium_rewards([-2] * 10, seed=3)):.1f} after 10 of 200 steps"
     assert player.frames == 11
-    assert player.lines == ["Start: seed 3, g = 1", score]
+    assert player.lines == ["Start: seed 3, Pendulum-v1, g = 1", score]
 
 
 def test_after_the_score_r_repeats_the_start_and_enter_plays_the_next(no_window: None) -> None:
@@ -166,8 +230,8 @@ def test_after_the_score_r_repeats_the_start_and_enter_plays_the_next(no_window:
     assert player.scores[0] == player.scores[1]
     # 999 is the last seed of USUAL_SEEDS.
     assert [line for line in player.lines if "seed" in line] == [
-        "Start: seed 999, g = 1",
-        "Start: seed 0, g = 1",
+        "Start: seed 999, Pendulum-v1, g = 1",
+        "Start: seed 0, Pendulum-v1, g = 1",
     ]
     assert player.rewards[-3:] == [round(r, 3) for r in gymnasium_rewards([2] * 3, seed=0)]
 
@@ -213,15 +277,21 @@ def test_no_text_overlaps_another_or_leaves_the_window(
     monkeypatch.setattr(Writer, "write", record)
     monkeypatch.setattr(Window, "show", check)
     policy = as_policy(lambda observation: -2.0)
-    keys = {1: pygame.K_l, 405: pygame.K_ESCAPE}
+    keys = {1: [pygame.K_h, pygame.K_l], 405: pygame.K_ESCAPE}
     assert play_game(keys, seed=999, gravity=10.0, policy=policy).frames == 405
+    keys = {1: [pygame.K_h, pygame.K_l], 600: pygame.K_ESCAPE}
+    agent = kp.load_policy("cartpole")
+    assert play_game(keys, seed=999, task=CartPole(), policy=agent).frames == 600
+
+
+PLAYED = played_task(Pendulum())
 
 
 def portrait(path: Any, earlier: Any = ()) -> Any:
     """Returns the pixels [1000, 640, 3] of a phase portrait."""
     screen = pygame.Surface(window_module._SIZE)
     screen.fill(drawing.WHITE)
-    draw_portrait(screen, Writer(screen).write, window_module._RIGHT, path, earlier)
+    draw_portrait(screen, Writer(screen).write, window_module._RIGHT, PLAYED, path, earlier)
     return pygame.surfarray.array3d(screen)
 
 
@@ -239,14 +309,14 @@ def test_path_does_not_cross_the_portrait_where_the_angle_jumps() -> None:
 @pytest.mark.parametrize(("angle", "side"), [(0.5 * np.pi, "left"), (-0.5 * np.pi, "right")])
 def test_pendulum_is_drawn_counterclockwise_from_upright(angle: float, side: str) -> None:
     pixels = pygame.surfarray.array3d(draw_pendulum(angle, 0.0, (500, 456)))
-    rod = (abs(pixels.astype(int) - drawing._ROD).sum(axis=2) < 30).sum(axis=1)
+    rod = (abs(pixels.astype(int) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
     assert (rod[:250].sum() > 3 * rod[250:].sum()) == (side == "left")
 
 
 def test_arrow_of_the_torque_has_a_white_border_on_the_rod() -> None:
     pixels = pygame.surfarray.array3d(draw_pendulum(np.pi, 2.0, (500, 456))).astype(int)
     below = pixels[250, 228 + 20 :]  # from the pivot down, along the hanging rod
-    colors = {"rod": drawing._ROD, "arrow": rgb(COUNTERCLOCKWISE), "border": drawing.WHITE}
+    colors = {"rod": drawing.ROD, "arrow": rgb(COUNTERCLOCKWISE), "border": drawing.WHITE}
     crossed: list[str] = []
     for pixel in below[:150]:
         for name, color in colors.items():  # the pixel between two colors has neither
@@ -289,7 +359,7 @@ def test_strip_along_the_lower_edge_grows_with_the_episode(no_window: None) -> N
 
 
 def test_invalid_torque_is_refused_before_the_environment() -> None:
-    episode = ManualEpisode(Pendulum().make_env(), seed=0)
+    episode = ManualEpisode(PLAYED, Pendulum().make_env(), seed=0)
     for torque in (float("nan"), float("inf"), -2.001, 40.0):
         with pytest.raises(ValueError, match="expected a number from -2 to 2"):
             episode.step(torque)
@@ -343,22 +413,25 @@ def test_leaving_while_the_agent_drives_prints_the_score_of_the_player(
         (["--against", "reference"], 1.0),
         (["--against", "swingup"], 10.0),
         (["--against", "swingup", "--gravity", "0"], 0.0),
+        (["--against", "cartpole"], None),
+        (["--environment", "CartPole-v1"], None),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_gravity_is_the_flag_or_the_recorded_one_or_1(
-    words: list[str], gravity: float, no_window: None, monkeypatch: pytest.MonkeyPatch
+    words: list[str], gravity: float | None, no_window: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     played: list[Any] = []
 
-    def record(window: Window, control_c: object, task: Pendulum, *settings: Any) -> int:
+    def record(window: Window, control_c: object, task: Any, *settings: Any) -> int:
         played.extend([task, *settings])
         return 0
 
     monkeypatch.setattr(play_command, "_run_game", record)
     assert play_command.main([*words, "--seed", "7"]) == 0
     task, seed, policy, _ = played
-    assert (task, seed, policy is not None) == (Pendulum(gravity), 7, "--against" in words)
+    expected = CartPole() if gravity is None else Pendulum(gravity)
+    assert (task, seed, policy is not None) == (expected, 7, "--against" in words)
 
 
 # Plays in a window that is closed at once.
@@ -383,7 +456,9 @@ def test_play_without_a_policy_imports_no_tensorflow() -> None:
         env={**os.environ, "SDL_VIDEODRIVER": "dummy"},
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert re.fullmatch(r"(pygame .*\n.*\n)?Start: seed 4, g = 1\nyou .*\n", done.stdout)
+    assert re.fullmatch(
+        r"(pygame .*\n.*\n)?Start: seed 4, Pendulum-v1, g = 1\nyou .*\n", done.stdout
+    )
 
 
 @pytest.mark.parametrize(
@@ -391,7 +466,12 @@ def test_play_without_a_policy_imports_no_tensorflow() -> None:
     [
         (["--against", "missing.h5"], "missing.h5: no such file"),
         (["--against", "text.h5"], "text.h5: not an HDF5 file"),
-        (["--against", "cartpole"], "cartpole.h5: belongs to CartPole-v1; expected Pendulum-v1"),
+        (["--against", "cartpole", "--gravity", "2"], "gravity belongs to Pendulum-v1"),
+        (["--environment", "CartPole-v1", "--gravity", "2"], "gravity belongs to Pendulum-v1"),
+        (
+            ["--environment", "CartPole-v1", "--against", "swingup"],
+            "swingup is an agent of Pendulum-v1, not of CartPole-v1",
+        ),
         (["--against", ""], "the name is empty"),
         (["--gravity", "nan", "--against", "missing.h5"], "gravity is nan"),
         (["--seed", "-1", "--against", "missing.h5"], "seed is -1"),
@@ -523,7 +603,7 @@ def test_control_c_that_pygame_drops_ends_play_at_the_next_frame() -> None:
 
         frames = 0
 
-        def pressed_keys(self) -> list[Key]:
+        def key_events(self) -> list[tuple[Key, bool]]:
             return []
 
         def show(self, view: object) -> None:
@@ -534,7 +614,7 @@ def test_control_c_that_pygame_drops_ends_play_at_the_next_frame() -> None:
                     signal.raise_signal(signal.SIGINT)
 
     window: Any = DroppingWindow()
-    game = Game(Pendulum(), 5)
+    game = Game(played_task(Pendulum()), 5)
     before = signal.getsignal(signal.SIGINT)
     # The test runner may have been started with Ctrl-C ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
