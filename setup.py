@@ -1,4 +1,4 @@
-"""Copies the shipped weights into a wheel; everything else of the build is in setup.cfg."""
+"""Copies what lies outside of the package into a wheel; the rest of the build is in setup.cfg."""
 
 from pathlib import Path
 
@@ -9,7 +9,8 @@ from setuptools.command.build_py import build_py
 class BuildWithWeights(build_py):
     """Builds the package, with the files of `weights/` in `keras_pendulum/shipped_weights/`.
 
-    An editable install needs no copy: the package finds `weights/` beside it. With `package_dir` in
+    `examples/my_dqn.py` is copied to `keras_pendulum/exercise/`. An editable install needs no
+    copies: the package finds both folders beside it. With `package_dir` in
     setup.cfg instead, setuptools would install an import finder in place of a path.
     """
 
@@ -21,6 +22,7 @@ class BuildWithWeights(build_py):
             folder.mkdir(parents=True, exist_ok=True)
             for file in (*Path("weights").glob("*.h5"), Path("weights", "returns.json")):
                 self.copy_file(str(file), str(folder / file.name))
+            self.copy_file("examples/my_dqn.py", str(folder.parent / "exercise" / "my_dqn.py"))
 
 
 setup(cmdclass={"build_py": BuildWithWeights})

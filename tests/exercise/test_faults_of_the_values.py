@@ -1,0 +1,47 @@
+"""Exercises whose fault shows in learned values, and the program without a fault."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from program_runs import healthy_program, result_of
+from test_faults_of_the_record import SHOWN
+
+from keras_pendulum.exercise.check import answer
+from keras_pendulum.exercise.program import exercise, program
+from keras_pendulum.exercise.table import CARTPOLE, EXERCISES, PENDULUM
+
+STEPS = 8_000
+LEARNED = (1, 3, 10, 11, 17)
+NOT_NAMED = (20,)  # `diagnose` says `not-converged`; docs/teaching.md says so
+
+
+def test_every_exercise_has_a_test() -> None:
+    assert sorted((*SHOWN, *LEARNED, *NOT_NAMED)) == list(EXERCISES)
+
+
+@pytest.mark.parametrize("number", LEARNED)
+def test_diagnosis_names_the_fault_first(number: int, tmp_path: Path) -> None:
+    each = exercise(number)
+    result = result_of(program(number), each.environment, STEPS, tmp_path)
+    assert result["findings"][0]["name"] == each.finding, result["verdict"]
+    assert not answer(number, result)[0]
+
+
+@pytest.mark.parametrize("number", NOT_NAMED)
+def test_fault_without_a_name_is_not_healthy(number: int, tmp_path: Path) -> None:
+    result = result_of(program(number), exercise(number).environment, 2_500, tmp_path)
+    healthy, text = answer(number, result)
+    assert not healthy
+    assert text.startswith("Not healthy yet: regret ")
+
+
+@pytest.mark.parametrize(
+    ("environment", "steps", "number"), [(PENDULUM, 8_000, 1), (CARTPOLE, 16_000, 4)]
+)
+def test_program_without_a_fault_is_healthy(
+    environment: str, steps: int, number: int, tmp_path: Path
+) -> None:
+    result = result_of(healthy_program(environment), environment, steps, tmp_path)
+    assert answer(number, result)[0], result["verdict"]
