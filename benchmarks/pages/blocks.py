@@ -41,6 +41,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "files of the DQN": code_blocks.dqn_files,
     "measured diagnosis": lambda: markdown(rows_of("diagnosis")),
     "strangers": lambda: markdown(rows_of("diagnosis_strangers")),
+    "strangers of CartPole": lambda: markdown(rows_of("diagnosis_cartpole")),
     "healthy networks": lambda: markdown(rows_of("diagnosis_healthy")),
     "two faults": lambda: markdown(rows_of("diagnosis_pairs")),
 }

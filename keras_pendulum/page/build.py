@@ -1,5 +1,7 @@
 """The page as one HTML file: the files of `web/` with the network's weights inside.
 
+The scripts and the texts of a task are in a folder of their own in `web/`.
+
 The weights are base64 of float32, so the page needs no server and no network connection.
 """
 
@@ -8,25 +10,20 @@ from __future__ import annotations
 import base64
 import json
 import re
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.environments.pendulum import Pendulum, require_pendulum
-from keras_pendulum.optimum.value_iteration import solve
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.environments.task import Task
+from keras_pendulum.errors import ConfigError
+from keras_pendulum.page.task_content import FOLDERS, optimum_content
 from keras_pendulum.storage.load_weights import recorded_return
 from keras_pendulum.storage.run_info import RunInfo
 from keras_pendulum.version import __version__
 
 _WEB = resources.files("keras_pendulum.page") / "web"
-
-
-THETA_CELLS = 400  # of the optimum's table
-SPEED_STRIDE = 10  # keeps every tenth row: 0.05 rad/s apart
 
 
 def build_page(
@@ -40,45 +37,45 @@ def build_page(
     """Returns the HTML file.
 
     Args:
-        network: a network for Pendulum-v1.
+        network: a network for Pendulum-v1 or CartPole-v1.
         path: the file that the network was loaded from.
-        gravity: m/s²; None takes the recorded one, else 1.
-        against: a second network that is shown beside the first, and its file.
+        gravity: m/s², of the pendulum; None takes the recorded one, else 1.
+        against: a second network, for the same environment, that is shown beside the first, and
+            its file.
         training: the `training_content` of the network's run.
         name: the name of the network on the page; None takes that of the file.
 
-    Raises ConfigError for a gravity out of range, and for a network of CartPole.
+    Raises ConfigError for a gravity out of range, and for networks of two environments.
     """
-    gravity = _gravity(network, path, gravity)
-    content = _network_content(network, path, gravity) | {
+    task = _recorded_task(network).with_gravity(gravity)
+    content = _network_content(network, path, task) | {
         "version": __version__,
         "against": None,
         "training": training,
-        "optimum": _optimum_content(gravity, THETA_CELLS),
+        "optimum": optimum_content(task),
     }
     if name is not None:
         content["name"] = name
     if against is not None:
-        _gravity(*against, gravity)
-        content["against"] = _network_content(*against, gravity)
-    return _fill(content).encode()
+        other = _recorded_task(against[0]).environment
+        if other != task.environment:
+            raise ConfigError(f"{against[1]}: belongs to {other}; {path} to {task.environment}")
+        content["against"] = _network_content(*against, task)
+    return _fill(content, FOLDERS[task.environment]).encode()
 
 
-def _gravity(network: DQN, path: Path, gravity: float | None) -> float:
-    """Returns the gravity of the page. Raises ConfigError for a network of CartPole."""
-    task = RunInfo.from_record(network.metadata).task or Pendulum()
-    task = require_pendulum(task, f"{path}:", "the page shows Pendulum-v1")
-    return task.with_gravity(gravity).gravity
+def _recorded_task(network: DQN) -> Task:
+    return RunInfo.from_record(network.metadata).task or Pendulum()
 
 
-def _network_content(network: DQN, path: Path, gravity: float) -> dict[str, Any]:
+def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
     """Returns what the page knows of a network."""
     info = RunInfo.from_record(network.metadata)
     weights = b"".join(array.astype("<f4").tobytes() for array in network.get_weights())
     return {
         "name": path.name,
         "preset": info.preset,
-        "gravity": gravity,
+        "gravity": task.gravity,
         "trainedGravity": info.task.gravity if info.task else None,
         "evaluatedReturn": recorded_return(path),
         "sizes": [network.observation_size, *network.hidden_units, network.action_count],
@@ -88,28 +85,14 @@ def _network_content(network: DQN, path: Path, gravity: float) -> dict[str, Any]
     }
 
 
-@cache
-def _optimum_content(gravity: float, cells: int) -> dict[str, Any]:
-    """Returns the table of the optimal value of 200 steps; uint16 of its root, which is precise."""
-    roots = np.sqrt(-solve(gravity, theta_cells=cells)[::SPEED_STRIDE])
-    scale = float(roots.max()) / np.iinfo(np.uint16).max
-    table = np.rint(roots / scale).astype("<u2")
-    rows, columns = table.shape
-    return {
-        "rows": rows,
-        "columns": columns,
-        "scale": scale,
-        "table": base64.b64encode(table.tobytes()).decode(),
-    }
-
-
-def _fill(content: dict[str, Any]) -> str:
-    """Returns the page with its style sheet, its scripts and `content` inside."""
+def _fill(content: dict[str, Any], folder: str) -> str:
+    """Returns the page with its style sheet, its scripts, its texts and `content` inside."""
 
     def read(name: str) -> str:
         return (_WEB / name).read_text(encoding="utf-8")
 
-    page = read("pendulum.html")
+    texts = {"folder": folder, **json.loads(read(f"{folder}/texts.json"))}
+    page = re.sub(r"\{\{(.+?)\}\}", lambda m: texts[m[1]], read("page.html"))
     page = re.sub(
         r'<link rel="stylesheet" href="(.+)">', lambda m: f"<style>\n{read(m[1])}</style>", page
     )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.figures.learning_curve import trailing_mean
+from keras_pendulum.figures.learning_curve import curve_values, trailing_mean
 from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.storage.run_folder import RunFolder
 from keras_pendulum.storage.snapshots import read_snapshots
@@ -40,7 +40,8 @@ def training_content(folder: RunFolder, network: DQN) -> dict[str, Any] | None:
     """
     if not folder.snapshots.exists():
         return None
-    history = load_recorded_run(folder.weights).history
+    recorded = load_recorded_run(folder.weights)
+    history = recorded.history
     snapshots = read_snapshots(folder.snapshots, network, history)
     # After the last episode, the exact network replaces its snapshot.
     before = [each for each in snapshots if each.episodes < len(history)]
@@ -49,15 +50,15 @@ def training_content(folder: RunFolder, network: DQN) -> dict[str, Any] | None:
     shapes = [array.shape for array in network.get_weights()]
     return {
         "episodes": [*(each.episodes for each in before), len(history)],
-        "curve": _curve([record.average_reward for record in history]),
+        "curve": _curve(curve_values(history, recorded.config.task)),
         "networks": [_encode(each.weights, shapes) for each in before],
     }
 
 
-def _curve(rewards: Sequence[float]) -> list[float]:
+def _curve(values: Sequence[float]) -> list[float]:
     """Returns evenly spaced points of the trailing mean, the first and the last one included."""
-    ends = np.linspace(1, len(rewards), min(len(rewards), _MOST_POINTS)).round().astype(int)
-    return [float(f"{value:.4g}") for value in trailing_mean(rewards)[ends - 1]]
+    ends = np.linspace(1, len(values), min(len(values), _MOST_POINTS)).round().astype(int)
+    return [float(f"{value:.4g}") for value in trailing_mean(values)[ends - 1]]
 
 
 def _encode(weights: NDArray[np.float16], shapes: Sequence[tuple[int, ...]]) -> dict[str, str]:

@@ -65,8 +65,8 @@ def test_name_of_another_format_is_refused(tmp_path: Path) -> None:
 
 
 def test_keras_model_of_other_inputs_is_named() -> None:
-    model = keras.Sequential([keras.layers.Input((4,)), keras.layers.Dense(5)])
-    with pytest.raises(kp.UserError, match=r"inputs of the shape \(None, 4\)"):
+    model = keras.Sequential([keras.layers.Input((5,)), keras.layers.Dense(5)])
+    with pytest.raises(kp.UserError, match=r"inputs of the shape \(None, 5\)"):
         kp.evaluate_policy(model, 1)
     with pytest.raises(kp.UserError, match="expected axis -1 of input shape") as error:
         kp.evaluate_policy(kp.q_function(model), 1)

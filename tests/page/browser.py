@@ -77,7 +77,7 @@ class Player:
         return self.find(id).text
 
     def button(self, torque: int) -> WebElement:
-        return self.driver.find_element(By.CSS_SELECTOR, f'[data-torque="{torque}"]')
+        return self.driver.find_element(By.CSS_SELECTOR, f'[data-direction="{torque // 2}"]')
 
     def press(self, *keys: str) -> None:
         """Types keys into the element that has the focus."""
@@ -104,9 +104,9 @@ class Player:
         return state
 
     def focus(self) -> str:
-        """Returns the id of the element that has the focus, or its torque or layer."""
+        """Returns the id of the element that has the focus, or its direction or layer."""
         script = "const e = document.activeElement;"
-        return str(self.run(f"{script} return e.id || e.dataset.torque || e.dataset.layer"))
+        return str(self.run(f"{script} return e.id || e.dataset.direction || e.dataset.layer"))
 
     def log(self, kind: str) -> list[dict[str, Any]]:
         """Returns the entries of a browser log since the last call."""

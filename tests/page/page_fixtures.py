@@ -45,9 +45,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def coarse_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     """Makes the optimum of new pages coarse, which is much faster."""
-    from keras_pendulum.page import build
+    from keras_pendulum.page import task_content
 
-    monkeypatch.setattr(build, "THETA_CELLS", 50)
+    monkeypatch.setattr(task_content, "THETA_CELLS", 50)
 
 
 class _Pages(dict[str, str]):

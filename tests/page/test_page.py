@@ -54,7 +54,7 @@ def test_names_lines_and_q_values_belong_to_their_network(duel: str, player: Pla
     player.set_screen(667, 375)
     player.run("pendulum.page.other.return = -1234.56; pendulum.page.changed = true")
     wait_for(lambda: player.text("return-1") == "−1234.6")
-    one, other = player.boxes("#pendulum", "#pendulum-1")
+    one, other = player.boxes("#system", "#system-1")
     assert one["top"] == other["top"]  # side by side, however many lines a name has
 
 
@@ -77,7 +77,7 @@ def test_page_sends_no_network_requests(pages: dict[str, str], player: Player) -
     log = "".join(entry["message"] for entry in player.log("performance"))
     requested = re.findall(r'"method":"Network.requestWillBeSent".*?"url":"(.*?)"', log)
     assert requested == [pages["small"]]
-    source = "".join(path.read_text(encoding="utf-8") for path in WEB.iterdir())
+    source = "".join(path.read_text(encoding="utf-8") for path in WEB.rglob("*.*"))
     assert "http" not in re.sub(r'"http-equiv"|http-equiv=', "", source).lower()
 
 

@@ -24,23 +24,23 @@ def test_switch_takes_over_and_torque_acts_until_the_next_choice(
     player.press("j")
     start = player.state()["steps"]
     wait_for(lambda: player.state()["steps"] > start + 5)
-    assert player.state()["torque"] == -2
-    assert player.text("torque") == "−2.00"
+    assert player.state()["effort"] == -2
+    assert player.text("effort") == "−2.00"
     assert player.button(-2).get_attribute("aria-pressed") == "true"
     assert player.button(0).get_attribute("aria-pressed") == "false"
     player.button(2).click()
-    wait_for(lambda: player.state()["torque"] == 2)
+    wait_for(lambda: player.state()["effort"] == 2)
     player.press("t")
     assert player.text("status") == "The network drives."
     assert player.button(2).get_attribute("aria-pressed") == "false"
     player.press(Keys.SPACE)
-    best = player.run("return pendulum.page.episode.network.torques[pendulum.state().best]")
+    best = player.run("return pendulum.page.episode.network.efforts[pendulum.state().best]")
     player.press("s")
-    assert player.state()["torque"] == best
+    assert player.state()["effort"] == best
     player.press("t")  # taking over again starts without torque
     assert player.button(0).get_attribute("aria-pressed") == "true"
     player.press("s")
-    assert player.state()["torque"] == 0
+    assert player.state()["effort"] == 0
 
 
 def test_touching_a_torque_takes_over_at_once(pages: dict[str, str], player: Player) -> None:
@@ -51,7 +51,7 @@ def test_touching_a_torque_takes_over_at_once(pages: dict[str, str], player: Pla
     assert player.text("status") == "You drive."
     assert player.button(-2).get_attribute("aria-pressed") == "true"
     finger.release().perform()
-    wait_for(lambda: player.state()["torque"] == -2)
+    wait_for(lambda: player.state()["effort"] == -2)
 
 
 def test_time_runs_at_20_steps_per_second_and_pauses_and_restarts(
@@ -138,7 +138,7 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
         order.append(player.focus())
         outline = "getComputedStyle(document.activeElement).outline"
         assert "solid 3px" in player.run(f"return {outline}")
-    assert order == ["take-over", "pause", "one-step", "restart", "-2", "0", "2", "0", "2"]
+    assert order == ["take-over", "pause", "one-step", "restart", "-1", "0", "1", "0", "2"]
     player.press(Keys.SPACE)  # the button's own key, not the pause
     assert player.text("status") == "The network drives."
     assert player.run("return pendulum.page.layer") == 2
@@ -147,7 +147,7 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
     player.find("take-over").send_keys(Keys.ENTER)
     assert player.text("status") == "You drive."
     player.button(2).send_keys(Keys.SPACE)
-    wait_for(lambda: player.state()["torque"] == 2)
+    wait_for(lambda: player.state()["effort"] == 2)
     keys = ActionChains(player.driver, duration=0)
     keys.key_down(Keys.CONTROL).send_keys("j").key_up(Keys.CONTROL).perform()
     assert player.button(2).get_attribute("aria-pressed") == "true"  # the browser's own shortcut

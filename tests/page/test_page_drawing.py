@@ -20,7 +20,7 @@ from keras_pendulum.environments.pendulum import Pendulum
 @pytest.mark.parametrize("theta", [0.8, -2.0, 3.0])
 def test_pendulum_points_where_gymnasium_draws_it(theta: float, user: Player) -> None:
     user.run("pendulum.reset(arguments[0], 0)", theta)
-    rod = pixels_of(user, "pendulum", "rod")
+    rod = pixels_of(user, "system", "rod")
     env: Any = Pendulum().make_env(render_mode="rgb_array")
     env.reset(seed=0)
     env.unwrapped.state = np.array([theta, 0.0])
@@ -42,7 +42,7 @@ def test_arrow_of_a_positive_torque_turns_counter_clockwise(
 ) -> None:
     user.run("pendulum.reset(0, 0)")
     user.press(key, "s")
-    arrow = pixels_of(user, "pendulum", colour)
+    arrow = pixels_of(user, "system", colour)
     # The arrow is below the pivot: its wide head is on the right if it turns counter-clockwise.
     columns = np.nonzero(arrow)[1] - arrow.shape[1] / 2
     assert side * columns.mean() > 1
@@ -111,14 +111,14 @@ def test_map_shows_the_greedy_torque_of_every_state(files: dict[str, Path], user
     theta, thetadot = np.meshgrid(np.linspace(-np.pi, np.pi, size), np.linspace(8, -8, size))
     observations = np.stack([np.cos(theta), np.sin(theta), thetadot], axis=-1).astype(np.float32)
     q = policy.q_values(observations.reshape(-1, 3))
-    found = np.array(user.run("return Array.from(pendulum.page.map.torques)"))
+    found = np.array(user.run("return Array.from(pendulum.page.map.efforts)"))
     taken = q[np.arange(len(q)), [grid.nearest_index(torque) for torque in found]]
     assert (q.max(axis=1) - taken).max() < TIE
     assert len(set(found.tolist())) > 3  # a uniform map would prove nothing
 
     colours, ends = user.run(
         "const {colours} = pendulum.page.view;"
-        "return [[-2, 0, 2].map(colours.ofTorque), [colours.minus, colours.none, colours.plus]]"
+        "return [[-2, 0, 2].map(colours.ofEffort), [colours.minus, colours.none, colours.plus]]"
     )
     assert colours == [list(bytes.fromhex(end[1:])) for end in ends]  # the colours of the legend
 
@@ -132,7 +132,7 @@ def test_map_shows_the_greedy_torque_of_every_state(files: dict[str, Path], user
             round(left + column / (size - 1) * (right - left)),
         )
         torque = found.reshape(size, size)[row, column]
-        expected = user.run("return pendulum.page.view.colours.ofTorque(arguments[0])", torque)
+        expected = user.run("return pendulum.page.view.colours.ofEffort(arguments[0])", torque)
         row, column = pixel  # beside the lines of the hatching
         assert expected in picture[row, column - 2 : column + 3].tolist()
 
@@ -140,7 +140,7 @@ def test_map_shows_the_greedy_torque_of_every_state(files: dict[str, Path], user
 def test_clockwise_torques_are_hatched(user: Player) -> None:
     colours = user.run(
         "const count = (torque) => {"
-        "  const map = {size: 97, torques: new Float32Array(97 * 97).fill(torque)};"
+        "  const map = {size: 97, efforts: new Float32Array(97 * 97).fill(torque)};"
         "  const picture = mapPicture(map, pendulum.page.view.colours, 200, 100);"
         "  const {data} = picture.getContext('2d').getImageData(0, 0, 200, 100);"
         "  return new Set(new Uint32Array(data.buffer)).size;"

@@ -62,7 +62,7 @@ def test_widest_readings_do_not_touch(duel: str, player: Player) -> None:
     player.open_paused(duel)
     # Each new part of the map would write the readings anew.
     player.run("pendulum.page.map.work(60000); pendulum.page.changeMap()")
-    widest = {"torque": "−2.0", "reward": "−16.27", "return": "−1848.8", "step": "200/200"}
+    widest = {"effort": "−2.0", "reward": "−16.27", "return": "−1848.8", "step": "200/200"}
     widest |= {"theta": "−3.14", "thetadot": "−8.00", "optimum": "−1234.5"}
     for width, height in (*SCREENS, (1216, 700), (1024, 768), (667, 375), (320, 568)):
         player.set_screen(width, height)
@@ -123,7 +123,7 @@ def test_first_screen_shows_what_belongs_together(
             # Nothing to scroll to, and no empty strip below the words.
             assert player.run("return document.documentElement.scrollHeight") <= height
             assert player.boxes("footer")[0]["bottom"] >= height - 20
-            (canvas,) = player.boxes("#pendulum")
+            (canvas,) = player.boxes("#system")
             # The circle of the end of a pendulum, less the margins of swing.js.
             assert min(canvas["width"] - 28, canvas["height"] - 56) >= 210
 

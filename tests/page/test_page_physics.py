@@ -47,12 +47,12 @@ def test_200_steps_agree_with_gymnasium_and_the_policy(
             q = policy.q_values(observation)
             np.testing.assert_allclose(row["qValues"], q, rtol=0, atol=TOLERANCE)
             action = int(q.argmax())
-            page_action = grid.nearest_index(row["torque"])
+            page_action = grid.nearest_index(row["effort"])
             if page_action != action and q[action] - q[page_action] < TIE:
                 action, ties = page_action, ties + 1
             observation, reward, _, over, _ = env.step(grid.to_env_action(action))
             total += float(reward)
-            found = [row[key] for key in ("theta", "thetadot", "torque", "reward", "return")]
+            found = [row[key] for key in ("theta", "thetadot", "effort", "reward", "return")]
             expected = [*pendulum.state, grid.torques[action], reward, total]
             np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE)
             assert (row["steps"], row["over"]) == (step + 1, over)
@@ -80,9 +80,9 @@ def test_torques_of_keys_act_as_in_gymnasium(user: Player) -> None:
             _, reward, _, _, _ = env.step(np.array([float(torque)]))
             fastest = max(fastest, abs(pendulum.state[1]))
         state = user.state()
-        found = [state[name] for name in ("theta", "thetadot", "torque", "reward")]
+        found = [state[name] for name in ("theta", "thetadot", "effort", "reward")]
         np.testing.assert_allclose(found, [*pendulum.state, torque, reward], atol=TOLERANCE)
-        assert user.text("torque") == f"{torque:+.2f}".replace("-", "−").replace("+0", "0")
+        assert user.text("effort") == f"{torque:+.2f}".replace("-", "−").replace("+0", "0")
     assert state["steps"] == 145
     assert fastest == 8  # the pendulum reached the speed limit
 
@@ -95,9 +95,7 @@ def test_optimum_of_a_start_is_the_exact_one(
 ) -> None:
     player.open_paused(pages[name])
     starts = pendulum_starts(range(20)).tolist()
-    found = player.run(
-        "return arguments[0].map(s => pendulum.page.optimum.returnFrom(s[0], s[1]))", starts
-    )
+    found = player.run("return arguments[0].map(s => pendulum.page.optimum.returnFrom(s))", starts)
     shortfall = kp.optimal_return(gravity, range(20)) - found
     assert shortfall.min() > -0.01  # a simulated return cannot be above the optimum
     assert np.median(shortfall) < 0.05
@@ -108,7 +106,7 @@ def test_map_switches_to_the_optimum(user: Player) -> None:
     user.press("m")
     wait_for(lambda: user.run("return pendulum.page.layer === 2 && pendulum.page.map.ready"))
     size = user.run("return pendulum.page.map.size")
-    found = np.array(user.run("return Array.from(pendulum.page.map.torques)"))
+    found = np.array(user.run("return Array.from(pendulum.page.map.efforts)"))
     found = found.reshape(size, size)
     inner = found[1:-1, 1:-1]
     np.testing.assert_allclose(inner, -inner[::-1, ::-1], atol=0.21)  # the mirrored states

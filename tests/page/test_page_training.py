@@ -94,7 +94,7 @@ def test_map_and_cursor_move_with_the_slider(run: Path, page: str, player: Playe
     for index in (4, 1, 4):
         player.run("pendulum.page.training.show(arguments[0])", index)
         wait_for(lambda: player.run("return pendulum.page.map.ready"))
-        maps.append(player.run("return Array.from(pendulum.page.map.torques)"))
+        maps.append(player.run("return Array.from(pendulum.page.map.efforts)"))
         if index == 1:
             ink = pixels_of(player, "curve", "ink")
             column = ink.sum(axis=0).argmax()

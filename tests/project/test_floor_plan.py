@@ -19,7 +19,7 @@ PACKAGE = Path(keras_pendulum.__file__).parent
 # From the top down. `__main__` and `diagnose` start commands. The modules at the end have no room;
 # every module may import them.
 ROOMS = (
-    *("study", "compare", "diagnosis", "page", "play", "train", "evaluate", "figures"),
+    *("exercise", "study", "compare", "diagnosis", "page", "play", "train", "evaluate", "figures"),
     *("optimum", "storage", "config", "dqn", "environments"),
 )
 WITHOUT_ROOM = (

@@ -64,6 +64,7 @@ def test_wheel_contains_package_data_and_weights_only(built: Built) -> None:
     expected = files_below(ROOT / "keras_pendulum", "keras_pendulum") | {
         f"keras_pendulum/shipped_weights/{path.name}" for path in ROOT.glob("weights/*")
     }
+    expected.add("keras_pendulum/exercise/my_dqn.py")  # of examples/
     with zipfile.ZipFile(built.wheel) as archive:
         found = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert found == expected

@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import keras
 import pytest
 from conftest import ROOT, Command
@@ -105,6 +106,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (path / "my_agent.py").write_text(AGENTS, encoding="utf-8")
     model = keras.Sequential([keras.Input((3,)), keras.layers.Dense(5)])
     model.save(path / "mine.keras")
+    env = kp.Recorder(gymnasium.make("Pendulum-v1"))
+    env.reset(seed=0)
+    env.step([0.0])
+    env.save(path / "run.npz")
     return path
 
 

@@ -12,11 +12,11 @@ function steadyFloor(lowest, before) {
   return -power * [1, 2, 5, 10].find((factor) => factor * power >= span * 0.999999);
 }
 
-/** Draws a bar for the Q-value of each torque, from `floor` below the best up, and marks `taken`. */
-function drawBars(canvas, colours, torques, qValues, floor, best, taken) {
+/** Draws a bar for the Q-value of each effort, from `floor` below the best up, and marks `taken`. */
+function drawBars(canvas, colours, task, efforts, qValues, floor, best, taken) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = [76, width - 6, 12, height - 38];
-  const pitch = (right - left) / torques.length;
+  const pitch = (right - left) / efforts.length;
   const middle = (i) => left + (i + 0.5) * pitch;
   const lowest = bottom - 4; // y of the floor; the lowest bar stays visible
 
@@ -38,7 +38,7 @@ function drawBars(canvas, colours, torques, qValues, floor, best, taken) {
   qValues.forEach((value, i) => {
     const y = top + ((value - qValues[best]) / floor) * (lowest - top);
     const [x, wide] = [middle(i) - pitch * 0.41, pitch * 0.82];
-    context.fillStyle = i === best ? colours.ink : `rgb(${colours.ofTorque(torques[i])})`;
+    context.fillStyle = i === best ? colours.ink : `rgb(${colours.ofEffort(efforts[i])})`;
     context.fillRect(x, y, wide, bottom - y);
     if (i !== best) {
       context.strokeStyle = colours.soft;
@@ -48,12 +48,12 @@ function drawBars(canvas, colours, torques, qValues, floor, best, taken) {
   });
 
   context.fillStyle = colours.soft;
-  const place = (torque) =>
-    middle(((torque + MAX_TORQUE) / (2 * MAX_TORQUE)) * (torques.length - 1));
-  for (const torque of [-2, -1, 0, 1, 2]) {
-    write(context, shown(torque, 0, torque !== 0), place(torque), bottom + 15);
+  const place = (effort) =>
+    middle(((effort + task.maxEffort) / (2 * task.maxEffort)) * (efforts.length - 1));
+  for (const [effort, label] of task.effortTicks) {
+    write(context, label, place(effort), bottom + 15);
   }
-  write(context, "torque (N·m)", (left + right) / 2, bottom + 31);
+  write(context, task.effortAxis, (left + right) / 2, bottom + 31);
   if (taken !== null) {
     context.fillStyle = colours.accent;
     const x = place(taken);

@@ -1,7 +1,7 @@
 "use strict";
 
-/** Returns the colours of the style sheet in the present theme, light or dark. */
-function readColours() {
+/** Returns the colours of the style sheet in the present theme, light or dark; efforts up to a largest one. */
+function readColours(maxEffort) {
   const style = getComputedStyle(document.documentElement);
   const names = ["card", "ink", "soft", "line", "rod", "accent", "minus", "none", "plus", "path"];
   const colours = Object.fromEntries(
@@ -9,10 +9,10 @@ function readColours() {
   );
   const channels = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
   const [minus, none, plus] = [colours.minus, colours.none, colours.plus].map(channels);
-  /** Returns red, green and blue of a torque in N·m. */
-  colours.ofTorque = (torque) => {
-    const share = Math.abs(torque) / MAX_TORQUE;
-    const end = torque < 0 ? minus : plus;
+  /** Returns red, green and blue of an effort. */
+  colours.ofEffort = (effort) => {
+    const share = Math.abs(effort) / maxEffort;
+    const end = effort < 0 ? minus : plus;
     return none.map((channel, i) => Math.round(channel + share * (end[i] - channel)));
   };
   return colours;

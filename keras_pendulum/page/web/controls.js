@@ -1,10 +1,8 @@
 "use strict";
 
-const TORQUE_OF_KEY = { j: -2, arrowleft: -2, k: 0, l: 2, arrowright: 2 }; // N·m
+const DIRECTION_OF_KEY = { j: -1, arrowleft: -1, k: 0, l: 1, arrowright: 1 }; // of your effort
 // The directions of θ and θ̇ on the phase portrait.
 const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1] };
-const NUDGE = [0.1, 0.5]; // rad, rad/s
-const FINE_NUDGE = [0.01, 0.1]; // with Shift
 const ONCE = [" ", "m", "h", "r", "t", "p"]; // keys that act once when they are held
 
 /** Connects buttons, keys, pointers and preferences to the page. */
@@ -27,10 +25,10 @@ class Controls {
   /** Shows the state of the page in the buttons and the status line. */
   update() {
     const { episode, names, running } = this.page;
-    const { youDrive, yourTorque } = episode;
+    const { youDrive, yourEffort } = episode;
     element("take-over").setAttribute("aria-checked", youDrive);
-    for (const button of document.querySelectorAll("[data-torque]")) {
-      const pressed = youDrive && Number(button.dataset.torque) === yourTorque;
+    for (const button of document.querySelectorAll("[data-direction]")) {
+      const pressed = youDrive && Number(button.dataset.direction) === Math.sign(yourEffort);
       button.setAttribute("aria-pressed", pressed);
     }
     element("pause").firstElementChild.textContent = running ? "Pause" : "Play";
@@ -51,8 +49,8 @@ class Controls {
     click(element("one-step"), () => page.oneStep());
     click(element("restart"), () => page.restart());
     click(element("play-training"), () => page.playTraining());
-    for (const button of document.querySelectorAll("[data-torque]")) {
-      const act = () => page.choose(Number(button.dataset.torque));
+    for (const button of document.querySelectorAll("[data-direction]")) {
+      const act = () => page.choose(Number(button.dataset.direction));
       button.addEventListener("pointerdown", act); // when the finger touches, not when it leaves
       click(button, act);
     }
@@ -63,9 +61,9 @@ class Controls {
 
   #listenToPointers() {
     const { page } = this;
-    const touch = new Touch((theta, thetadot, released) => page.put(theta, thetadot, released));
-    touch.listenToPendulum(element("pendulum"));
-    touch.listenToPendulum(element("pendulum-1"));
+    const touch = new Touch(page);
+    touch.listenToSystem(element("system"), page.episode);
+    if (page.other) touch.listenToSystem(element("system-1"), page.other);
     touch.listenToPortrait(element("portrait"));
   }
 
@@ -80,13 +78,13 @@ class Controls {
     if (event.repeat && ONCE.includes(key)) return event.preventDefault(); // Space would scroll
     if (id === "portrait" && ARROWS[key]) this.#nudge(ARROWS[key], event.shiftKey);
     else if (page.heldByKey && (key === "enter" || key === " ")) page.letGo();
-    else if (key in TORQUE_OF_KEY) page.choose(TORQUE_OF_KEY[key]);
+    else if (key in DIRECTION_OF_KEY) page.choose(DIRECTION_OF_KEY[key]);
     // Up and down scroll the page unless you drive.
     else if (upOrDown && page.episode.youDrive) page.choose(0);
     else if (key === " ") page.pause();
     else if (key === "s") page.oneStep();
     else if (key === "m") page.showLayer(page.nextLayer());
-    else if (key === "h") page.restart(Math.PI, 0);
+    else if (key === "h" && page.task.hanging) page.restart(...page.task.hanging);
     else if (key === "r") page.restart();
     else if (key === "t") page.drive(!page.episode.youDrive);
     else if (key === "p") page.playTraining();
@@ -94,14 +92,16 @@ class Controls {
     event.preventDefault();
   }
 
-  /** Moves the pendulum by a step of the keyboard and holds it there. */
+  /** Moves θ and θ̇ by a step of the keyboard and holds the system there. */
   #nudge(direction, fine) {
-    const { theta, thetadot } = this.page.episode;
-    const [angle, speed] = [wrapped(theta), thetadot].map((value, i) => {
+    const { page } = this;
+    const { task } = page;
+    const [theta, thetadot] = page.episode.state.slice(-2);
+    const [angle, speed] = [task.angle(theta), thetadot].map((value, i) => {
       if (!direction[i]) return value;
-      const step = (fine ? FINE_NUDGE : NUDGE)[i];
+      const step = (fine ? task.fineNudges : task.nudges)[i];
       return (Math.round(value / step) + direction[i]) * step;
     });
-    this.page.put(wrapped(angle), clipped(speed, MAX_SPEED), false, true);
+    page.putOnPortrait(task.angle(angle), speed, false, true);
   }
 }

@@ -1,13 +1,15 @@
 "use strict";
 
-/** The Q-network of the weights file: Dense layers, then one linear output for each torque. */
+/** The Q-network of the weights file: Dense layers, then one linear output for each action. */
 class Network {
   /**
    * @param {{sizes: number[], activation: string}} recorded sizes of all layers, the observation's
-   *   3 first; one activation for all hidden layers, or one for each, separated by commas.
+   *   first; one activation for all hidden layers, or one for each, separated by commas.
    * @param {Float32Array} numbers the weights: kernel [in, out] and bias [out] of each layer in order.
+   * @param {Task} task
    */
-  constructor({ sizes, activation }, numbers) {
+  constructor({ sizes, activation }, numbers, task) {
+    this.task = task;
     const expected = sizes.slice(1).reduce((sum, units, i) => sum + (sizes[i] + 1) * units, 0);
     if (numbers.length !== expected) {
       throw new Error(`it contains ${numbers.length} weights; expected ${expected}`);
@@ -22,16 +24,12 @@ class Network {
       sums: new Float64Array(units),
       output: new Float32Array(units),
     }));
-    // Like NumPy's linspace: the last torque is exact.
-    const count = sizes.at(-1);
-    const step = (2 * MAX_TORQUE) / (count - 1);
-    this.torques = Array.from({ length: count }, (_, i) => i * step - MAX_TORQUE); // N·m
-    this.torques[count - 1] = MAX_TORQUE;
+    this.efforts = task.efforts(sizes.at(-1));
   }
 
   static #ACTIVATIONS = { tanh: Math.tanh, relu: (x) => (x > 0 ? x : 0), linear: (x) => x };
 
-  /** Returns the Q-values [A] of an observation [3]; the next call overwrites the array. */
+  /** Returns the Q-values [A] of an observation; the next call overwrites the array. */
   qValues(observation) {
     let features = observation;
     for (const { kernel, bias, activate, sums, output } of this.layers) {
@@ -57,9 +55,9 @@ class Network {
     return features;
   }
 
-  /** Returns the greedy torque in N·m. */
-  torque(theta, thetadot) {
-    return this.torques[argmax(this.qValues(observed(theta, thetadot)))];
+  /** Returns the greedy effort. */
+  effort(state) {
+    return this.efforts[argmax(this.qValues(this.task.observed(state)))];
   }
 }
 

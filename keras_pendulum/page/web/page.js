@@ -8,19 +8,21 @@ const REST = 3; // s between two episodes
 class Page {
   /**
    * @param {object} recorded the content of the page, see build.py.
+   * @param {Task} task
    * @param {Network[]} networks one or two; the second is driven from the same starts, in step.
    * @param {Optimum} optimum
    * @param {?Training} training the networks that the slider shows in place of the first one.
    */
-  constructor(recorded, networks, optimum, training) {
+  constructor(recorded, task, networks, optimum, training) {
     this.recorded = recorded;
+    this.task = task;
     this.optimum = optimum;
     this.training = training;
-    this.episodes = networks.map((each) => new Episode(each, recorded.gravity));
+    this.episodes = networks.map((each) => new Episode(each, task));
     [this.episode, this.other] = this.episodes;
-    this.maps = [networks[0], networks[1], optimum].map((each) => each && new TorqueMap(each));
+    this.maps = [networks[0], networks[1], optimum].map((each) => each && new PolicyMap(each, task));
     this.layer = 0;
-    this.held = false; // whether a pointer or a key holds the pendulum
+    this.held = false; // whether a pointer or a key holds the system
     this.heldByKey = false;
     this.names = networkNames(recorded);
     this.showNames();
@@ -35,40 +37,47 @@ class Page {
     requestAnimationFrame((now) => this.frame(now, now));
   }
 
-  /** Takes the steps that are due, 20 per second, and draws. */
+  /** Takes the steps that are due and draws. */
   frame(now, before) {
+    const { timeStep } = this.task;
     requestAnimationFrame((later) => this.frame(later, now));
     const seconds = (now - before) / 1000;
     this.training?.advance(seconds);
     if (this.running && !this.held) {
       // Limited, so that a tab that was hidden does not rush through the missed steps.
-      this.waiting = Math.min(this.waiting + seconds, 4 * TIME_STEP);
-      if (this.episode.over) {
+      this.waiting = Math.min(this.waiting + seconds, 4 * timeStep);
+      if (this.over) {
         this.resting += seconds; // time to read the score
-        this.waiting = this.resting < REST ? 0 : TIME_STEP;
+        this.waiting = this.resting < REST ? 0 : timeStep;
       }
-      for (; this.waiting >= TIME_STEP; this.waiting -= TIME_STEP) this.step();
+      for (; this.waiting >= timeStep; this.waiting -= timeStep) this.step();
     }
     if (this.changed || (this.running && !calm.matches)) this.view.drawSwing();
+    this.map.aim(this.task.others?.(this.episode.state) ?? []);
     if (this.map.work(8)) this.changeMap();
     if (this.changed) this.view.drawRest();
     this.training?.drawIfChanged(this.view.colours);
     this.changed = false;
   }
 
+  /** Whether all episodes are over: one may be shorter than the other. */
+  get over() {
+    return this.episodes.every(({ over }) => over);
+  }
+
   /** Takes the next time step; after the last one, starts a new episode. */
   step() {
-    if (this.episode.over) this.restart();
+    if (this.over) this.restart();
     else {
-      this.episodes.forEach((episode) => episode.step());
-      if (this.episode.over) this.showScore();
+      this.episodes.forEach((episode) => episode.over || episode.step());
+      if (this.over) this.showScore();
     }
     this.changed = true;
   }
 
   /** Starts an episode, with both networks from the same start. */
-  restart(theta, thetadot) {
-    this.episode.reset(theta, thetadot);
+  restart(...state) {
+    this.episode.reset(...state);
     this.start = this.episode.path[0];
     this.other?.reset(...this.start);
     this.optimalReturn = null;
@@ -88,25 +97,24 @@ class Page {
 
   /** Shows the returns of the finished episode, of the network too if you drove, and the optimum. */
   showScore() {
-    const { episode, other, names, start } = this;
+    const { episode, task, other, names, start } = this;
     const youDrove = episode.drivers.has("you");
     const helped = youDrove && episode.drivers.has("network");
     const driver = helped ? `you and ${names[0]}` : youDrove ? "you" : names[0];
     const parts = [[driver, episode.return]];
     if (youDrove) {
-      const { gravity, network } = episode;
-      const policy = (theta, thetadot) => network.torque(theta, thetadot);
-      parts.push([names[0], simulatedReturn(gravity, ...start, EPISODE_STEPS, policy)]);
+      const policy = (state) => episode.network.effort(state);
+      parts.push([names[0], simulatedReturn(task, start, task.episodeSteps, policy)]);
     }
     if (other) parts.push([names[1], other.return]);
-    const optimal = this.optimalReturn ?? this.optimum.returnFrom(...start);
+    const optimal = this.optimalReturn ?? this.optimum.returnFrom(start);
     this.optimalReturn = Math.max(optimal, ...parts.map(([, total]) => total));
     parts.push(["optimum", this.optimalReturn]);
-    const texts = parts.map(([name, total]) => `${name} ${shown(total, 1)}`);
+    const texts = parts.map(([name, total]) => `${name} ${shown(total, task.returnDigits)}`);
     element("score").textContent = `Score: ${texts.join(" · ")}`;
   }
 
-  /** Labels the pendulums and the layers of the map. */
+  /** Labels the systems and the layers of the map. */
   showNames() {
     const { names } = this;
     if (!this.other) return;
@@ -162,29 +170,36 @@ class Page {
   }
 
   drive(youDrive) {
-    if (youDrive && !this.episode.youDrive) this.episode.yourTorque = 0;
+    if (youDrive && !this.episode.youDrive) this.episode.yourEffort = 0;
     this.episode.youDrive = youDrive;
     this.changed = true;
     this.controls.update();
   }
 
-  choose(torque) {
+  /** Lets you drive with an effort to the left (-1), to the right (1) or with none (0). */
+  choose(direction) {
     this.drive(true);
-    this.episode.yourTorque = torque;
+    this.episode.yourEffort = direction * this.task.maxEffort;
     this.controls.update();
   }
 
-  /** Puts the pendulum into a state; an episode starts there when it is released. */
-  put(theta, thetadot, released, byKey = false) {
+  /** Puts the system into a state; an episode starts there when it is released. */
+  put(state, released, byKey = false) {
     this.held = !released;
     this.heldByKey = this.held && byKey;
-    this.restart(theta, thetadot);
+    this.restart(...state);
     this.controls.update();
   }
 
-  /** Releases the pendulum that a key holds. */
+  /** Puts θ and θ̇; the other numbers of the state stay. */
+  putOnPortrait(theta, thetadot, released, byKey = false) {
+    const speed = clipped(thetadot, this.task.largest[1]);
+    this.put([...this.episode.state.slice(0, -2), theta, speed], released, byKey);
+  }
+
+  /** Releases the system that a key holds. */
   letGo() {
-    if (this.heldByKey) this.put(...this.start, true);
+    if (this.heldByKey) this.put(this.start, true);
   }
 
   redraw() {

@@ -3,7 +3,7 @@
 const HATCH = 9; // px between two lines
 
 /**
- * Returns the torque map as a picture of `width` x `height` pixels. The torques below 0 are hatched,
+ * Returns a map as a picture of `width` x `height` pixels. The efforts below 0 are hatched,
  * because both directions are equally dark.
  */
 function mapPicture(map, colours, width, height) {
@@ -14,7 +14,7 @@ function mapPicture(map, colours, width, height) {
   const [cellX, cellY] = [width / (map.size - 1), height / (map.size - 1)];
   const draw = (colourOf) =>
     context.drawImage(cells(map, colourOf), -cellX / 2, -cellY / 2, width + cellX, height + cellY);
-  draw((torque) => (torque < 0 ? [0, 0, 0, 255] : [0, 0, 0, 0]));
+  draw((effort) => (effort < 0 ? [0, 0, 0, 255] : [0, 0, 0, 0]));
   context.globalCompositeOperation = "source-in"; // lines there, and nothing elsewhere
   context.strokeStyle = colours.hatch;
   const sharpness = window.devicePixelRatio || 1;
@@ -26,23 +26,23 @@ function mapPicture(map, colours, width, height) {
   }
   context.stroke();
   context.globalCompositeOperation = "destination-over";
-  draw((torque) => [...colours.ofTorque(torque), 255]);
+  draw((effort) => [...colours.ofEffort(effort), 255]);
   return picture;
 }
 
-/** Returns a picture with one pixel for each torque of a map; `colourOf` returns RGBA. */
+/** Returns a picture with one pixel for each effort of a map; `colourOf` returns RGBA. */
 function cells(map, colourOf) {
   const picture = new OffscreenCanvas(map.size, map.size);
   const context = picture.getContext("2d");
   const image = context.createImageData(map.size, map.size);
   const pixels = new Uint32Array(image.data.buffer); // little-endian
-  const seen = new Map(); // a map has few different torques
-  map.torques.forEach((torque, i) => {
-    if (!seen.has(torque)) {
-      const [red, green, blue, alpha] = colourOf(torque);
-      seen.set(torque, (alpha << 24) | (blue << 16) | (green << 8) | red);
+  const seen = new Map(); // a map has few different efforts
+  map.efforts.forEach((effort, i) => {
+    if (!seen.has(effort)) {
+      const [red, green, blue, alpha] = colourOf(effort);
+      seen.set(effort, (alpha << 24) | (blue << 16) | (green << 8) | red);
     }
-    pixels[i] = seen.get(torque);
+    pixels[i] = seen.get(effort);
   });
   context.putImageData(image, 0, 0);
   return picture;
@@ -54,15 +54,16 @@ function portraitEdges(width, height) {
 }
 
 /**
- * Draws the phase plane: the map, and the paths of [θ, θ̇] over it, the second one dashed.
+ * Draws the phase plane: the map, and the paths of states over it, the second one dashed.
  * `pictureOf` returns the map's picture for its width and height in pixels.
  */
-function drawPortrait(canvas, colours, pictureOf, paths) {
+function drawPortrait(canvas, colours, task, pictureOf, paths) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = portraitEdges(width, height);
   const sharpness = canvas.width / width;
-  const x = (theta) => left + ((theta / Math.PI + 1) / 2) * (right - left);
-  const y = (thetadot) => top + ((1 - thetadot / MAX_SPEED) / 2) * (bottom - top);
+  const [largestAngle, largestSpeed] = task.largest;
+  const x = (theta) => left + ((theta / largestAngle + 1) / 2) * (right - left);
+  const y = (thetadot) => top + ((1 - thetadot / largestSpeed) / 2) * (bottom - top);
 
   context.save();
   context.beginPath();
@@ -77,7 +78,7 @@ function drawPortrait(canvas, colours, pictureOf, paths) {
       context.strokeStyle = colour;
       context.lineWidth = thickness;
       context.setLineDash(i && colour === colours.path ? [5, 5] : []);
-      continuous(path).forEach((part) => line(context, part.map(([a, b]) => [x(a), y(b)])));
+      continuous(path, task).forEach((part) => line(context, part.map(([a, b]) => [x(a), y(b)])));
     }
   });
   context.restore();
@@ -87,37 +88,36 @@ function drawPortrait(canvas, colours, pictureOf, paths) {
 
   // The second network's circle is hollow, and below the first one's.
   for (const [i, path] of [...paths.entries()].reverse()) {
-    const [theta, thetadot] = path.at(-1);
+    const [theta, thetadot] = path.at(-1).slice(-2);
     [context.fillStyle, context.strokeStyle] = [colours.path, colours.halo];
     if (i) [context.fillStyle, context.strokeStyle] = [colours.halo, colours.path];
     context.lineWidth = 2.5;
     context.beginPath();
-    context.arc(x(wrapped(theta)), y(thetadot), i ? 8 : 6.5, 0, 2 * Math.PI);
+    context.arc(x(task.angle(theta)), y(thetadot), i ? 8 : 6.5, 0, 2 * Math.PI);
     context.fill();
     context.stroke();
   }
 
   context.fillStyle = colours.soft;
-  ["−π", "−π/2", "0", "π/2", "π"].forEach((text, i) => {
-    write(context, text, left + (i / 4) * (right - left), bottom + 13);
-  });
+  for (const [theta, label] of task.angleTicks) write(context, label, x(theta), bottom + 13);
   write(context, "angle θ (rad), 0 upright", (left + right) / 2, bottom + 31);
-  for (const value of [-8, -4, 0, 4, 8]) {
+  for (const value of task.speedTicks) {
     const inside = clipped(y(value) - (top + bottom) / 2, (bottom - top) / 2 - 4);
-    write(context, shown(value, 0), left - 6, inside + (top + bottom) / 2, "right");
+    write(context, shown(value, Number.isInteger(value) ? 0 : 1), left - 6, inside + (top + bottom) / 2, "right");
   }
   context.translate(12, (top + bottom) / 2);
   context.rotate(-Math.PI / 2);
   write(context, "velocity θ̇ (rad/s)", 0, 0);
 }
 
-/** Splits the path where it jumps from π to -π; both parts continue beyond the edge. */
-function continuous(path) {
+/** Splits the path where the angle jumps from π to -π; both parts continue beyond the edge. */
+function continuous(path, task) {
   const parts = [];
   let part = [];
   let shift = 0;
-  for (const [theta, thetadot] of path) {
-    const here = wrapped(theta) - theta;
+  for (const state of path) {
+    const [theta, thetadot] = state.slice(-2);
+    const here = task.angle(theta) - theta;
     if (part.length && Math.abs(here - shift) > 1) {
       const [before, speed] = part.at(-1);
       part.push([theta + shift, thetadot]);

@@ -4,25 +4,27 @@ try {
   const recorded = JSON.parse(element("network").textContent);
   if (!recorded) throw new Error("it contains no network");
   const records = [recorded, recorded.against].filter(Boolean);
-  const networks = records.map((each) => new Network(each, decodedFloats(each.weights)));
-  const optimum = new Optimum(recorded.optimum, recorded.gravity);
-  const training = recorded.training && new Training(recorded, networks[0]);
+  const task = new Task(recorded);
+  const networks = records.map((each) => new Network(each, decodedFloats(each.weights), task));
+  const optimum = new Optimum(recorded.optimum, task);
+  const training = recorded.training && new Training(recorded, networks[0], task);
   element("about").textContent = [
-    ...records.map(about),
+    ...records.map((each) => about(each, task)),
     `Written by keras_pendulum ${recorded.version}.`,
   ].join(" ");
   element("elsewhere").textContent = elsewhereText(records, networkNames(recorded));
-  document.title = `Inverted pendulum: ${recorded.name}`;
-  const page = new Page(recorded, networks, optimum, training);
+  document.title += `: ${recorded.name}`;
+  const page = new Page(recorded, task, networks, optimum, training);
   /** Access to the page from the console and from tests. */
   window.pendulum = {
     page,
-    reset: (theta, thetadot) => page.restart(theta, thetadot),
+    reset: (...state) => page.restart(...state),
     step: () => page.step(),
     qValues: (observation) => Array.from(page.episode.network.qValues(observation)),
     state: () => {
-      const { network, path, drivers, ...rest } = page.episode;
-      return { ...rest, qValues: Array.from(rest.qValues), over: page.episode.over };
+      const { network, path, drivers, task: _, ...rest } = page.episode;
+      const [theta, thetadot] = rest.state.slice(-2);
+      return { ...rest, theta, thetadot, qValues: Array.from(rest.qValues) };
     },
   };
 } catch (error) {

@@ -3,61 +3,68 @@
 const FLICK_TIME = 0.1; // s before the release that determine the speed of a flick
 
 /**
- * Lets a pointer move the system: a drag turns a pendulum and its last movement pushes it, and a
- * press on the phase portrait chooses θ and θ̇.
+ * Lets a pointer move the system: a drag moves a number of the state, such as the angle, its last
+ * movement is the speed, and a press on the phase portrait chooses θ and θ̇.
  */
 class Touch {
-  /** `put` is called with θ, θ̇ and whether the pointer is released. */
-  constructor(put) {
-    this.put = put;
-    this.moves = []; // [time in s, θ without jumps] of the present drag
+  constructor(page) {
+    this.page = page;
+    this.moves = []; // [time in s, value] of the present drag
   }
 
-  listenToPendulum(canvas) {
-    const angle = (event) => {
+  listenToSystem(canvas, episode) {
+    const { page } = this;
+    const { task } = page;
+    let [state, grip] = [null, 0]; // while it is dragged, and which number of it
+    const place = (event) => {
       const { left, top, width, height } = canvas.getBoundingClientRect();
-      return Math.atan2(left + width / 2 - event.clientX, top + height / 2 - event.clientY);
+      return [[event.clientX - left, event.clientY - top], [width, height]];
     };
-    const add = (event) => {
-      const before = this.moves.at(-1)?.[1] ?? angle(event);
-      this.moves.push([event.timeStamp / 1000, before + wrapped(angle(event) - before)]);
+    const move = (event) => {
+      state[grip] = task.gripped(state, grip, ...place(event));
+      this.moves.push([event.timeStamp / 1000, state[grip]]);
+      page.put(state, false);
     };
     this.#drag(canvas, {
       down: (event) => {
         this.moves = [];
-        add(event);
-        this.put(this.moves.at(-1)[1], 0, false);
+        grip = task.grip(episode.state, ...place(event));
+        state = [...episode.state];
+        state[grip + 1] = 0;
+        move(event);
       },
-      move: (event) => {
-        add(event);
-        this.put(this.moves.at(-1)[1], 0, false);
+      move,
+      up: (event) => {
+        const speed = clipped(this.flickSpeed(event.timeStamp / 1000), task.limits[grip + 1]);
+        state[grip + 1] = speed;
+        page.put(state, true);
       },
-      up: (event) => this.put(this.moves.at(-1)[1], this.flickSpeed(event.timeStamp / 1000), true),
     });
   }
 
   listenToPortrait(canvas) {
+    const { page } = this;
+    const { task } = page;
     const state = (event) => {
       const { left: x, top: y, width, height } = canvas.getBoundingClientRect();
       const [left, right, top, bottom] = portraitEdges(width, height);
       const share = (event.clientX - x - left) / (right - left);
       const rise = (event.clientY - y - top) / (bottom - top);
-      const theta = clipped((2 * share - 1) * Math.PI, Math.PI);
-      return [theta, clipped((1 - 2 * rise) * MAX_SPEED, MAX_SPEED)];
+      return [2 * share - 1, 1 - 2 * rise].map((value, i) => clipped(value, 1) * task.largest[i]);
     };
     this.#drag(canvas, {
-      down: (event) => this.put(...state(event), false),
-      move: (event) => this.put(...state(event), false),
-      up: (event) => this.put(...state(event), true),
+      down: (event) => page.putOnPortrait(...state(event), false),
+      move: (event) => page.putOnPortrait(...state(event), false),
+      up: (event) => page.putOnPortrait(...state(event), true),
     });
   }
 
-  /** Returns the angular velocity of the drag's last 0.1 s, in rad/s. */
+  /** Returns the speed of the drag's last 0.1 s. */
   flickSpeed(now) {
     const recent = this.moves.filter(([time]) => now - time <= FLICK_TIME);
     if (recent.length < 2) return 0;
     const [[start, from], [end, to]] = [recent[0], recent.at(-1)];
-    return clipped((to - from) / Math.max(end - start, 0.01), MAX_SPEED);
+    return (to - from) / Math.max(end - start, 0.01);
   }
 
   #drag(canvas, { down, move, up }) {

@@ -12,21 +12,22 @@ class Training {
    *   the networks were kept; `curve`, the rewards of a step at even distances from the first to the
    *   last episode; and `networks`, all but the last one.
    * @param {Network} last the network after the last of the episodes.
+   * @param {Task} task
    */
-  constructor(recorded, last) {
+  constructor(recorded, last, task) {
     const { episodes, curve, networks } = recorded.training;
-    Object.assign(this, { recorded, episodes, curve });
+    Object.assign(this, { recorded, episodes, curve, task });
     if (networks.length !== episodes.length - 1) throw new Error("a network of its training is missing");
     this.shown = networks.length;
     this.playing = false;
     this.seconds = 0; // since the present network is shown, while playing
     this.changed = true; // whether the curve must be drawn again
-    // Decoded when they are shown for the first time, with their torque maps.
+    // Decoded when they are shown for the first time, with their maps.
     this.cache = [];
-    this.cache[this.shown] = { network: last, map: new TorqueMap(last) };
+    this.cache[this.shown] = { network: last, map: new PolicyMap(last, task) };
   }
 
-  /** Starts to listen to the slider; `replace` is called with each network and its torque map. */
+  /** Starts to listen to the slider; `replace` is called with each network and its map. */
   listen(replace) {
     this.replace = replace;
     const slider = element("snapshot");
@@ -68,7 +69,7 @@ class Training {
   advance(seconds) {
     if (!this.playing) return;
     // Limited, so that a tab that was hidden does not rush through the training.
-    this.seconds += Math.min(seconds, 4 * TIME_STEP);
+    this.seconds += Math.min(seconds, 4 * this.task.timeStep);
     if (this.seconds < SECONDS_PER_NETWORK) return;
     if (this.shown === this.episodes.length - 1) this.stop();
     else this.show(this.shown + 1);
@@ -86,7 +87,7 @@ class Training {
     slider.value = this.shown;
     slider.setAttribute("aria-valuetext", `episode ${here} of ${end}`);
     const reward = curveValue(this.curve, here / end);
-    element("training-text").textContent = `episode ${here} of ${end}: reward per step ${shown(reward, 2)}`;
+    element("training-text").textContent = `episode ${here} of ${end}: ${this.task.curveName} ${shown(reward, 2)}`;
     element("play-training").firstElementChild.textContent = this.playing ? "Stop" : "Play training";
     this.changed = true;
   }
@@ -111,7 +112,7 @@ class Training {
     }
     const numbers = new Float32Array(weights.reduce((sum, { length }) => sum + length, 0));
     weights.reduce((sum, each) => (numbers.set(each, sum), sum + each.length), 0);
-    const network = new Network(this.recorded, numbers);
-    return { network, map: new TorqueMap(network) };
+    const network = new Network(this.recorded, numbers, this.task);
+    return { network, map: new PolicyMap(network, this.task) };
   }
 }

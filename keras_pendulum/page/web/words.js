@@ -22,13 +22,14 @@ function elsewhereText(records, names) {
 }
 
 /** Returns the text on a network. */
-function about({ name, preset, sizes, activation, gravity, trainedGravity, evaluatedReturn }) {
+function about(record, task) {
+  const { name, preset, sizes, activation, trainedGravity, evaluatedReturn } = record;
   const from = preset && !name.startsWith(`${preset}.`) ? ` (preset ${preset})` : "";
   const sentences = [
     `${name}${from}, a ${sizes.slice(1, -1).join("-")} ${activation} network with ` +
-      `${sizes.at(-1)} torques, on Pendulum-v1 with g = ${gravity} m/s².`,
+      task.about(sizes.at(-1)),
   ];
-  const elsewhere = isElsewhere({ gravity, trainedGravity });
+  const elsewhere = isElsewhere(record);
   if (elsewhere) {
     sentences.push(`Another gravity than in training: it was trained at g = ${trainedGravity} m/s².`);
   }
@@ -39,11 +40,11 @@ function about({ name, preset, sizes, activation, gravity, trainedGravity, evalu
   return sentences.join(" ");
 }
 
-/** Returns the status: who drives, and whether time is paused or the pendulum is held. */
-function statusText({ episode, other, running, heldByKey }) {
+/** Returns the status: who drives, and whether time is paused or the system is held. */
+function statusText({ episode, task, other, running, heldByKey }) {
   if (heldByKey) {
-    const [theta, thetadot] = [wrapped(episode.theta), episode.thetadot];
-    return `Held at ${shown(theta, 2)} rad, ${shown(thetadot, 2)} rad/s. Enter lets go.`;
+    const [theta, thetadot] = episode.state.slice(-2);
+    return `Held at ${shown(task.angle(theta), 2)} rad, ${shown(thetadot, 2)} rad/s. Enter lets go.`;
   }
   const networks = other ? "Both networks drive." : "The network drives.";
   const driver = episode.youDrive ? "You drive." : networks;

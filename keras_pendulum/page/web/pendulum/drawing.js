@@ -2,9 +2,11 @@
 
 /**
  * Draws the pendulum as Gymnasium does: upright at θ = 0, positive angles and torques
- * counter-clockwise. `trail` is an array of the last angles.
+ * counter-clockwise. `states` are the last ones; the present one is the last.
  */
-function drawPendulum(canvas, colours, theta, torque, trail) {
+function drawSystem(canvas, colours, states, torque, task) {
+  const trail = states.map(([theta]) => theta);
+  const theta = trail.at(-1);
   const { context, width, height } = blank(canvas);
   const rod = Math.min(width / 2 - 14, height / 2 - 28);
   const labelled = width / 2 - rod >= 52; // the sides have labels where they make it no smaller
@@ -47,15 +49,15 @@ function drawPendulum(canvas, colours, theta, torque, trail) {
   context.beginPath();
   context.arc(0, 0, rod * 0.03, 0, 2 * Math.PI);
   context.fill();
-  drawTorque(context, colours, rod, torque);
+  drawTorque(context, colours, rod, torque, task);
 }
 
 /** Draws a curved arrow below the pivot; its length is proportional to the torque. */
-function drawTorque(context, colours, rod, torque) {
+function drawTorque(context, colours, rod, torque, task) {
   if (Math.abs(torque) < 0.01) return;
   const radius = rod * 0.42;
   const sign = -Math.sign(torque); // a canvas counts angles clockwise
-  const share = Math.abs(torque) / MAX_TORQUE;
+  const share = Math.abs(torque) / task.maxEffort;
   const span = share * (2 / 3) * Math.PI;
   const [start, end] = [Math.PI / 2 - (sign * span) / 2, Math.PI / 2 + (sign * span) / 2];
   const colour = torque < 0 ? colours.minus : colours.plus;

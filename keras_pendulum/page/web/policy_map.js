@@ -1,23 +1,31 @@
 "use strict";
 
-/** The torque of a policy over the phase plane, computed in small portions, coarse cells first. */
-class TorqueMap {
-  constructor(policy, size = 97) {
-    this.policy = policy; // its method `torque` returns a torque in N·m for θ and θ̇
-    this.size = size; // θ from -π to π by columns, θ̇ from 8 to -8 by rows, ends included
-    this.torques = new Float32Array(size * size);
-    this.ready = false;
-    this.#cells = this.#coarseToFine();
+/** The effort of a policy over the phase plane, computed in small portions, coarse cells first. */
+class PolicyMap {
+  constructor(policy, task) {
+    this.policy = policy; // its method `effort` returns one for a state
+    this.task = task;
+    this.size = task.mapSize; // columns of θ, rows of θ̇ from above, ends included
+    this.efforts = new Float32Array(this.size ** 2);
+    this.aim([]);
   }
 
   #cells;
 
+  /** Chooses the other numbers of the states, such as the position of the cart. */
+  aim(others) {
+    if (String(this.others) === String(others)) return;
+    this.others = others;
+    this.ready = false;
+    this.#cells = this.#coarseToFine();
+  }
+
   theta(column) {
-    return (2 * column / (this.size - 1) - 1) * Math.PI;
+    return ((2 * column) / (this.size - 1) - 1) * this.task.largest[0];
   }
 
   thetadot(row) {
-    return (1 - 2 * row / (this.size - 1)) * MAX_SPEED;
+    return (1 - (2 * row) / (this.size - 1)) * this.task.largest[1];
   }
 
   /** Computes for about `milliseconds`; returns whether the map has changed. */
@@ -31,10 +39,10 @@ class TorqueMap {
         break;
       }
       const [row, column, width] = value;
-      const torque = this.policy.torque(this.theta(column), this.thetadot(row));
+      const effort = this.policy.effort([...this.others, this.theta(column), this.thetadot(row)]);
       for (let i = row; i < Math.min(row + width, this.size); i++) {
         const j = i * this.size + column;
-        this.torques.fill(torque, j, Math.min(j + width, (i + 1) * this.size));
+        this.efforts.fill(effort, j, Math.min(j + width, (i + 1) * this.size));
       }
     } while (performance.now() < end);
     return true;

@@ -11,16 +11,16 @@ class Optimum {
    *   the negative values in units of `scale`, as base64 of uint16: rows are θ̇ from -8 to 8 rad/s,
    *   columns θ from -π to 0.
    */
-  constructor({ rows, columns, scale, table }, gravity) {
-    Object.assign(this, { rows, columns, gravity });
+  constructor({ rows, columns, scale, table }, task) {
+    Object.assign(this, { rows, columns, task });
     const roots = new Uint16Array(decodedBytes(table).buffer); // little-endian
     if (roots.length !== rows * columns) throw new Error("its table of the optimum has a wrong size");
     this.values = Float32Array.from(roots, (root) => -((root * scale) ** 2));
   }
 
   /** Returns the optimal return of 200 steps from a state, interpolated in the table. */
-  value(theta, thetadot) {
-    let angle = wrapped(theta);
+  value([theta, thetadot]) {
+    let angle = this.task.angle(theta);
     let speed = thetadot;
     if (angle > 0) [angle, speed] = [-angle, -speed]; // the mirrored state has the same value
     const y = ((speed + MAX_SPEED) / (2 * MAX_SPEED)) * (this.rows - 1);
@@ -34,40 +34,41 @@ class Optimum {
   }
 
   /** Returns the optimal torque in N·m. */
-  torque(theta, thetadot) {
+  effort(state) {
     let [best, highest] = [0, -Infinity];
     for (const torque of OPTIMUM_TORQUES) {
-      const [nextTheta, nextThetadot, reward] = advanced(this.gravity, theta, thetadot, torque);
-      const value = reward + this.value(nextTheta, nextThetadot);
+      const next = this.task.advanced(state, torque);
+      const value = next.reward + this.value(next.state);
       if (value > highest) [best, highest] = [torque, value];
     }
     return best;
   }
 
   /** Returns the highest return from a start. It is simulated, so it can be attained. */
-  returnFrom(theta, thetadot) {
-    const greedy = this.#greedyReturn(theta, thetadot, EPISODE_STEPS);
-    if (Math.abs(this.value(theta, thetadot) - greedy) <= SMOOTH_TOLERANCE) return greedy;
-    return Math.max(greedy, this.#searchedReturn(theta, thetadot));
+  returnFrom(state) {
+    const greedy = this.#greedyReturn(state, this.task.episodeSteps);
+    if (Math.abs(this.value(state) - greedy) <= SMOOTH_TOLERANCE) return greedy;
+    return Math.max(greedy, this.#searchedReturn(state));
   }
 
-  #greedyReturn(theta, thetadot, steps) {
-    return simulatedReturn(this.gravity, theta, thetadot, steps, (a, b) => this.torque(a, b));
+  #greedyReturn(state, steps) {
+    return simulatedReturn(this.task, state, steps, (each) => this.effort(each));
   }
 
   /** Tries every torque in the first steps; the torque afterwards is greedy. */
-  #searchedReturn(theta, thetadot) {
+  #searchedReturn(state) {
     let [past, highest] = [0, -Infinity];
     for (let step = 1; step <= SEARCHED_STEPS; step++) {
       let best = null;
       highest = -Infinity;
       for (const torque of OPTIMUM_TORQUES) {
-        const next = advanced(this.gravity, theta, thetadot, torque);
-        const total = past + next[2] + this.#greedyReturn(next[0], next[1], EPISODE_STEPS - step);
+        const next = this.task.advanced(state, torque);
+        const rest = this.task.episodeSteps - step;
+        const total = past + next.reward + this.#greedyReturn(next.state, rest);
         if (total > highest) [best, highest] = [next, total];
       }
-      [theta, thetadot] = best;
-      past += best[2];
+      state = best.state;
+      past += best.reward;
     }
     return highest;
   }
