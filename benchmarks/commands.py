@@ -72,6 +72,7 @@ COMMANDS = (
         results=("cartpole_speed", "cartpole_learning"),
         packages=("psutil", "torch"),
     ),
+    Command("learning.cartpole_falls", 1, results=("cartpole_falls",)),
     Command("diagnosis.single_faults", 45, (FOLDER,), ("diagnosis",)),
     Command(
         "diagnosis.strangers",

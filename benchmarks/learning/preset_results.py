@@ -23,7 +23,7 @@ from benchmarks.result_files import ROOT, Row, rows_of, write
 from benchmarks.speed.processes import run_process
 from keras_pendulum.storage.shipped_weights import shipped_returns
 
-PRESETS = ("original", "reference", "swingup", "cartpole")
+PRESETS = ("original", "reference", "swingup", "cartpole-original", "cartpole")
 
 
 def ship(preset: str, folder: Path) -> Row:

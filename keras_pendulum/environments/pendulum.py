@@ -44,7 +44,6 @@ class Pendulum(Task):
     )
     seconds_per_step: ClassVar[float] = 0.05
     weights_name: ClassVar[str] = "pendulum_weight.h5"
-    has_page: ClassVar[bool] = True
     usual_discount: ClassVar[float] = 0.9
     own_settings: ClassVar[tuple[str, ...]] = ("gravity", "torque_count", "stored_index")
     curve_column: ClassVar[str] = "average_reward"

@@ -28,7 +28,6 @@ class Task(ABC):
     reward_range: ClassVar[tuple[float, float]]  # of one step
     seconds_per_step: ClassVar[float]
     weights_name: ClassVar[str]  # file name of a run's checkpoint
-    has_page: ClassVar[bool] = False  # whether `page` and `play` show it
     usual_discount: ClassVar[float] = 0.99  # γ, for an agent that records none
     own_settings: ClassVar[tuple[str, ...]] = ()  # settings of a Config that only this task has
     curve_column: ClassVar[str] = "episode_return"  # of history.csv, for learning curves

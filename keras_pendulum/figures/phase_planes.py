@@ -1,4 +1,4 @@
-"""Phase planes as pictures: greedy torques in the upper row, values in the lower one."""
+"""Phase planes as pictures: greedy efforts in the upper row, values in the lower one."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.figures.style import SCALE
-from keras_pendulum.optimum.phase_plane import EXTENT, PhasePlane
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
+from keras_pendulum.optimum.phase_plane import PhasePlane
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +27,7 @@ def draw_planes(
     Args:
         figure: to draw on.
         place: in the figure.
-        planes: at least one, by name.
+        planes: at least one, by name; all of one task.
         between: the space between the two rows, as a share of a row's height.
     """
     from matplotlib.colors import LinearSegmentedColormap
@@ -36,35 +37,53 @@ def draw_planes(
         [figure.add_subplot(grid[row, column], title=name) for column, name in enumerate(planes)]
         for row in range(2)
     ]
-    torques = [plane.torque for plane in planes.values()]
-    colors = LinearSegmentedColormap.from_list("torque", SCALE)
-    bar = _draw_row(panels[0], torques, "Greedy torque (N·m)", cmap=colors, vmin=-2.0, vmax=2.0)
-    bar.set_ticks([-2, -1, 0, 1, 2])
-    for axes, map_ in zip(panels[0], torques, strict=True):
-        _hatch_clockwise(axes, map_)
-    _hatch_clockwise(bar.ax, np.array([[-1.0, -1.0], [1.0, 1.0]]), (0, 1, -2, 2))
+    dynamics = next(iter(planes.values())).dynamics
+    efforts, largest = [plane.effort for plane in planes.values()], dynamics.largest_effort
+    colors = LinearSegmentedColormap.from_list("effort", SCALE)
+    label = f"Greedy {dynamics.effort} ({dynamics.unit})"
+    bar = _draw_row(panels[0], efforts, dynamics, label, cmap=colors, vmin=-largest, vmax=largest)
+    bar.set_ticks(np.linspace(-largest, largest, 5).tolist())
+    for axes, map_ in zip(panels[0], efforts, strict=True):
+        _hatch_negative(axes, map_, _extent(dynamics))
+    ends_of_bar = np.array([[-largest, -largest], [largest, largest]])
+    _hatch_negative(bar.ax, ends_of_bar, (0, 1, -largest, largest))
     values = [plane.value for plane in planes.values()]
     # These colours become lighter and lighter, so that they are legible without colour.
     ends = {"vmin": np.min(values), "vmax": np.max(values)}
-    _draw_row(panels[1], values, "Discounted return (max Q)", cmap="viridis", **ends)
+    _draw_row(panels[1], values, dynamics, "Discounted return (max Q)", cmap="viridis", **ends)
 
 
 def _draw_row(
-    panels: Sequence[Axes], maps: Sequence[NDArray[np.float64]], label: str, **colors: Any
+    panels: Sequence[Axes],
+    maps: Sequence[NDArray[np.float64]],
+    dynamics: KnownDynamics,
+    label: str,
+    **colors: Any,
 ) -> Colorbar:
     """Draws maps over θ and θ̇ with one colour bar."""
+    angle, speed = dynamics.phase_ends
+    end = "π" if angle == np.pi else f"{angle:.2f}"
     for axes, values in zip(panels, maps, strict=True):
-        image = axes.imshow(values, origin="lower", extent=EXTENT, aspect="auto", **colors)
-        axes.set_yticks([-8, -4, 0, 4, 8])
-        axes.set_xticks([-np.pi, 0, np.pi], ["−π", "0 (upright)", "π"])
+        image = axes.imshow(
+            values, origin="lower", extent=_extent(dynamics), aspect="auto", **colors
+        )
+        axes.set_yticks(np.linspace(-speed, speed, 5).tolist())
+        axes.set_xticks([-angle, 0, angle], [f"−{end}", "0 (upright)", end])
         axes.set(xlabel="θ (rad)", ylabel="θ̇ (rad/s)")
     return axes.figure.colorbar(image, ax=panels, label=label, fraction=0.1, pad=0.03)
 
 
-def _hatch_clockwise(
-    axes: Axes, torques: NDArray[np.float64], extent: tuple[float, float, float, float] = EXTENT
+def _extent(dynamics: KnownDynamics) -> tuple[float, float, float, float]:
+    """Returns the ends of the axes: left, right, bottom and top."""
+    angle, speed = dynamics.phase_ends
+    return (-angle, angle, -speed, speed)
+
+
+def _hatch_negative(
+    axes: Axes, efforts: NDArray[np.float64], extent: tuple[float, float, float, float]
 ) -> None:
-    """Hatches the torques below 0, which have the darkness of those above 0."""
-    if torques.min() < 0:
-        hatched = axes.contourf(torques, [-3, -1e-9], extent=extent, colors="none", hatches=["//"])
+    """Hatches the efforts below 0, which have the darkness of those above 0."""
+    if efforts.min() < 0:
+        levels = [2 * efforts.min(), -1e-9]
+        hatched = axes.contourf(efforts, levels, extent=extent, colors="none", hatches=["//"])
         hatched.set_edgecolor("#ffffff99")

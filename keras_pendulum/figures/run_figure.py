@@ -97,7 +97,7 @@ def draw_live(
 
 
 def draw_phase_planes(planes: Mapping[str, PhasePlane]) -> bytes:
-    """Returns a PNG with greedy torques and values, one column for each phase plane."""
+    """Returns a PNG with greedy efforts and values, one column for each phase plane."""
 
     with own_style():
         figure, grid = _figure_with_grid(2, 1, top=0.5)

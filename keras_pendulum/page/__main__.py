@@ -34,20 +34,21 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         help="a file, the name of a shipped one, or the folder of a run",
     )
     against = parser.add_argument(
-        "--against", metavar="WEIGHTS.h5", help="a second network, shown beside the first"
+        "--against",
+        metavar="WEIGHTS.h5|RUN_FOLDER",
+        help="a second network, shown beside the first",
     )
     parser.add_argument(
         "--out",
         type=nonempty_path,
-        default="pendulum.html",
         metavar="FILE",
-        help="file of the page [pendulum.html]",
+        help="file of the page [pendulum.html, or cartpole.html]",
     )
     parser.add_argument(
         "--gravity",
         type=float,
         metavar="G",
-        help="gravity in m/s² [recorded in the file, else the better one of 10 and 1]",
+        help="of the pendulum, in m/s² [recorded in the file, else the better one of 10 and 1]",
     )
     add_activation_flag(parser)
     parser.add_argument("--open", action="store_true", help="open the page in the browser")
@@ -59,8 +60,6 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 def _write(arguments: argparse.Namespace) -> int:
     require_tensorflow()
-    out = Path(arguments.out)
-    require_no_other_file(out, _HEAD, "a page of this command")
     if arguments.open:
         _require_browser()
 
@@ -68,6 +67,7 @@ def _write(arguments: argparse.Namespace) -> int:
         from keras_pendulum.evaluate.evaluation import find_task
         from keras_pendulum.evaluate.sources import load_policy
         from keras_pendulum.page.build import build_page
+        from keras_pendulum.page.task_content import FOLDERS
         from keras_pendulum.page.training import training_content
         from keras_pendulum.storage.find_weights import find_weights
         from keras_pendulum.storage.load_weights import load_weights
@@ -82,10 +82,12 @@ def _write(arguments: argparse.Namespace) -> int:
         other = find_weights(arguments.against)  # also the folder of a run
         against = (load_weights(other), other)
     task, assumption = find_task(load_policy(network), arguments.gravity)
+    out = Path(arguments.out or f"{FOLDERS[task.environment]}.html")
+    require_no_other_file(out, _HEAD, "a page of this command")
     if assumption and arguments.gravity is None:
         print(assumption)
     with status("Computing the optimum for the page"):
-        page = build_page(network, path, task.gravity, against, training, name)
+        page = build_page(network, path, task, against, training, name)
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
+from keras_pendulum.evaluate.q_policies import DQNPolicy
 from keras_pendulum.page.task_content import FOLDERS, optimum_content
 from keras_pendulum.storage.load_weights import recorded_return
 from keras_pendulum.storage.run_info import RunInfo
@@ -29,7 +29,7 @@ _WEB = resources.files("keras_pendulum.page") / "web"
 def build_page(
     network: DQN,
     path: Path,
-    gravity: float | None = None,
+    task: Task,
     against: tuple[DQN, Path] | None = None,
     training: dict[str, Any] | None = None,
     name: str | None = None,
@@ -37,17 +37,16 @@ def build_page(
     """Returns the HTML file.
 
     Args:
-        network: a network for Pendulum-v1 or CartPole-v1.
+        network: a network for the task.
         path: the file that the network was loaded from.
-        gravity: m/s², of the pendulum; None takes the recorded one, else 1.
+        task: Pendulum-v1 or CartPole-v1.
         against: a second network, for the same environment, that is shown beside the first, and
             its file.
         training: the `training_content` of the network's run.
         name: the name of the network on the page; None takes that of the file.
 
-    Raises ConfigError for a gravity out of range, and for networks of two environments.
+    Raises ConfigError for networks of two environments.
     """
-    task = _recorded_task(network).with_gravity(gravity)
     content = _network_content(network, path, task) | {
         "version": __version__,
         "against": None,
@@ -57,15 +56,11 @@ def build_page(
     if name is not None:
         content["name"] = name
     if against is not None:
-        other = _recorded_task(against[0]).environment
+        other = DQNPolicy(against[0]).task.environment
         if other != task.environment:
             raise ConfigError(f"{against[1]}: belongs to {other}; {path} to {task.environment}")
         content["against"] = _network_content(*against, task)
     return _fill(content, FOLDERS[task.environment]).encode()
-
-
-def _recorded_task(network: DQN) -> Task:
-    return RunInfo.from_record(network.metadata).task or Pendulum()
 
 
 def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:

@@ -113,8 +113,7 @@ def _next_commands(
         best = shell_word(folder.path / folder.best.name)
         commands["Evaluate the best weights"] = f"evaluate {best}"
     commands["Watch it"] = f"evaluate {weights} --episodes 3 --render"
-    if config.task.has_page:
-        commands["Play against it"] = f"play --against {weights}"
-        shown = shell_word(folder.path) if folder.snapshots.exists() else weights
-        commands["Take it to a browser"] = f"page {shown}"
+    commands["Play against it"] = f"play --against {weights}"
+    shown = shell_word(folder.path) if folder.snapshots.exists() else weights
+    commands["Take it to a browser"] = f"page {shown}"
     return commands

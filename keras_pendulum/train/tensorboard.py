@@ -64,7 +64,7 @@ class TensorBoardLog(Listener):
                     tf.summary.scalar(name, value)
 
     def on_checkpoint(self, network: DQN, episode: int) -> None:
-        """Writes the phase planes of a pendulum's network, every 50 episodes and at the end."""
+        """Writes the phase planes of the network, every 50 episodes and at the end."""
         import tensorflow as tf
 
         from keras_pendulum.figures.run_figure import draw_phase_planes

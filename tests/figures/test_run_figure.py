@@ -19,6 +19,7 @@ from keras_pendulum.optimum.phase_plane import (
     PhasePlane,
     network_phase_plane,
     optimal_phase_plane,
+    run_phase_planes,
 )
 
 LEVELS = {"best possible": -40.0, "optimal policy for γ = 0.9": -41.0, "random actions": -900.0}
@@ -45,7 +46,18 @@ def make_history(episodes: int, evaluate_every: int = 0) -> list[EpisodeRecord]:
 
 @pytest.fixture(scope="module")
 def planes() -> dict[str, PhasePlane]:
-    return {"one": network_phase_plane(kp.DQN((8,))), "two": optimal_phase_plane(1.0, 0.5)}
+    return {
+        "one": network_phase_plane(kp.DQN((8,)), Pendulum()),
+        "two": optimal_phase_plane(Pendulum(), 0.5),
+    }
+
+
+def test_no_text_of_cartpole_planes_overlaps_another() -> None:
+    network, config = kp.DQN((8,), 2, observation_size=4), kp.preset("cartpole")
+    planes = run_phase_planes(network, config)
+    figure = figure_of(lambda: run_figure.draw_phase_planes(planes))
+    require_legible(figure)
+    assert "Greedy force (N)" in {axes.get_ylabel() for axes in figure.axes}
 
 
 @pytest.mark.parametrize(

@@ -152,6 +152,13 @@ class Player:
         return flat.reshape(-1, width, 4)
 
 
+def middle_of(player: Player, id: str) -> tuple[float, float]:
+    """Scrolls an element into view and returns its middle on the screen."""
+    player.run("arguments[0].scrollIntoView({block: 'center'})", player.find(id))
+    (box,) = player.boxes(f"#{id}")
+    return box["left"] + box["width"] / 2, box["top"] + box["height"] / 2
+
+
 def pixels_of(player: Player, canvas: str, colour: str) -> NDArray[np.bool_]:
     """Returns the mask [rows, columns] of the pixels with a colour of the style sheet."""
     hexadecimal = player.run(f"return pendulum.page.view.colours.{colour}")

@@ -36,6 +36,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {
         "reference": kp.find_weights("reference"),
         "swingup": kp.find_weights("swingup"),
+        "cartpole": kp.find_weights("cartpole"),
+        "cartpole-original": kp.find_weights("cartpole-original"),
         "swingup with the exact optimum": kp.find_weights("swingup"),
         "small": folder / "<!--<script>&.h5",
         "one": folder / "one.h5",

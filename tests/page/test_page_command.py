@@ -11,6 +11,7 @@ from conftest import ROOT, Command, Refusal
 from page_fixtures import coarse_optimum
 
 import keras_pendulum as kp
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.page.build import build_page
 
@@ -48,7 +49,7 @@ def test_page_contains_the_recorded_return_if_it_is_finite(
 ) -> None:
     network = kp.DQN((8,))
     kp.save_weights(network, tmp_path / "a.h5", evaluated_return)
-    text = build_page(network, tmp_path / "a.h5").decode()
+    text = build_page(network, tmp_path / "a.h5", Pendulum()).decode()
     assert f'"evaluatedReturn": {json},' in text
 
 
@@ -56,8 +57,9 @@ WRONG = [
     ([], "the following arguments are required: WEIGHTS.h5"),
     (["missing.h5"], "missing.h5: no such file"),
     (["text.h5"], "text.h5: not an HDF5 file"),
-    (["cartpole"], "belongs to CartPole-v1; the page shows Pendulum-v1"),
-    ([RECORDED, "--against", "cartpole"], "belongs to CartPole-v1; the page shows Pendulum-v1"),
+    (["cartpole", "--gravity", "1"], "gravity belongs to Pendulum-v1; CartPole-v1 has none"),
+    (["cartpole", "--against", "reference"], "reference.h5: belongs to Pendulum-v1; "),
+    ([RECORDED, "--against", "cartpole"], "cartpole.h5: belongs to CartPole-v1; "),
     ([RECORDED, "--against", "missing.h5"], "missing.h5: no such file"),
     ([RECORDED, "--gravity", "nan"], "gravity is nan"),
     ([RECORDED, "--gravity", "heavy"], "invalid float value: 'heavy'"),

@@ -10,6 +10,7 @@ import pytest
 from browser import TIE, Player, pixels_of
 from conftest import wait_for
 from numpy.typing import NDArray
+from selenium.webdriver.common.keys import Keys
 
 import keras_pendulum as kp
 from keras_pendulum.dqn.policy import greedy_policy
@@ -108,7 +109,7 @@ def test_map_shows_the_greedy_torque_of_every_state(files: dict[str, Path], user
     policy, grid = greedy_policy(network), TorqueGrid(network.action_count)
     wait_for(lambda: user.run("return pendulum.page.map.ready"))
     size = user.run("return pendulum.page.map.size")
-    theta, thetadot = np.meshgrid(np.linspace(-np.pi, np.pi, size), np.linspace(8, -8, size))
+    theta, thetadot = np.meshgrid(np.linspace(np.pi, -np.pi, size), np.linspace(8, -8, size))
     observations = np.stack([np.cos(theta), np.sin(theta), thetadot], axis=-1).astype(np.float32)
     q = policy.q_values(observations.reshape(-1, 3))
     found = np.array(user.run("return Array.from(pendulum.page.map.efforts)"))
@@ -157,9 +158,19 @@ def test_path_passes_every_state_and_leaves_the_map_only_at_the_edge(user: Playe
     assert path[0, 0] < np.pi < path[-1, 0]
     drawn = pixels_of(user, "portrait", "path")
     height, width = drawn.shape
-    columns = 46 + ((path[:, 0] + np.pi) % (2 * np.pi) / (2 * np.pi)) * (width - 56)
+    columns = 46 + ((np.pi - path[:, 0]) % (2 * np.pi) / (2 * np.pi)) * (width - 56)
     rows = 8 + (1 - path[:, 1] / 8) / 2 * (height - 48)
     for row, column in np.rint([rows, columns]).T.astype(int):
         assert drawn[row - 2 : row + 3, column - 2 : column + 3].any()
     # A line from one edge of the picture to the other would cross the middle.
     assert not drawn[:, round(46 + (width - 56) / 2)].any()
+
+
+def test_what_leans_to_the_right_is_on_the_right(user: Player) -> None:
+    user.run("pendulum.reset(0, 0)")
+    user.press(Keys.ARROW_RIGHT, "s" * 8)
+    assert user.state()["effort"] == -2  # clockwise
+    rod = pixels_of(user, "system", "rod")
+    assert np.nonzero(rod)[1].mean() > rod.shape[1] / 2 + 1
+    path = pixels_of(user, "portrait", "path")
+    assert np.nonzero(path)[1].max() > (46 + path.shape[1] - 10) / 2 + 5

@@ -13,13 +13,18 @@ from matplotlib.colors import to_rgb
 from selenium.webdriver.common.by import By
 
 
-def test_page_fits_every_screen_width(pages: dict[str, str], player: Player) -> None:
+@pytest.mark.parametrize("name", ["small", "cartpole"])
+def test_page_fits_every_screen_width(name: str, pages: dict[str, str], player: Player) -> None:
     player.set_screen(360, 740)
-    player.open_paused(pages["small"])
-    player.run("pendulum.reset(3, -8); pendulum.page.episode.return = -1234.56")
-    player.run("for (let i = 0; i < 200; i++) pendulum.step()")  # a last episode of four digits
+    player.open_paused(pages[name])
+    if name == "small":
+        player.run("pendulum.reset(3, -8); pendulum.page.episode.return = -1234.56")
+    else:
+        player.run("pendulum.reset(-2.35, 0.5, 0.2, -2)")
+    # A last episode of four digits.
+    player.run("do pendulum.step(); while (!pendulum.page.over)")
     player.press("t")
-    wait_for(lambda: player.text("score").startswith("Score: network −"))
+    wait_for(lambda: player.text("score").startswith("Score: network "))
     for width, height in ((320, 568), (360, 740), (390, 844), (600, 900), (844, 390), (960, 600)):
         player.set_screen(width, height)
         root = player.driver.find_element(By.TAG_NAME, "html")
@@ -124,7 +129,7 @@ def test_first_screen_shows_what_belongs_together(
             assert player.run("return document.documentElement.scrollHeight") <= height
             assert player.boxes("footer")[0]["bottom"] >= height - 20
             (canvas,) = player.boxes("#system")
-            # The circle of the end of a pendulum, less the margins of swing.js.
+            # The circle of the end of a pendulum, less the margins of drawing.js.
             assert min(canvas["width"] - 28, canvas["height"] - 56) >= 210
 
 

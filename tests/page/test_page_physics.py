@@ -70,9 +70,9 @@ def test_torques_of_keys_act_as_in_gymnasium(user: Player) -> None:
         ("j", -2, 30),
         ("l", 2, 20),
         ("k", 0, 5),
-        (Keys.ARROW_RIGHT, 2, 60),
+        (Keys.ARROW_LEFT, 2, 60),
         (Keys.ARROW_DOWN, 0, 5),
-        (Keys.ARROW_LEFT, -2, 20),
+        (Keys.ARROW_RIGHT, -2, 20),
         (Keys.ARROW_UP, 0, 5),
     ):
         user.press(key, "s" * steps)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import SCREENS, Player
+from browser import SCREENS, Player, middle_of
 from conftest import wait_for
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
@@ -82,17 +82,10 @@ def test_a_press_and_a_drag_on_the_portrait_choose_the_state(
         actions.perform()
         wait_for(lambda: not player.run("return pendulum.page.held"))
         found = player.run("return pendulum.page.episodes.map(e => e.state)")
-        np.testing.assert_allclose(found[0], [np.pi / 2, 4], atol=0.1)
+        np.testing.assert_allclose(found[0], [-np.pi / 2, 4], atol=0.1)
         assert found[0] == found[1]
         player.press("h")
         assert player.run("return pendulum.page.episodes.map(e => e.state[0])") == [np.pi, np.pi]
-
-
-def middle_of(player: Player, id: str) -> tuple[float, float]:
-    """Scrolls an element into view and returns its middle on the screen."""
-    player.run("arguments[0].scrollIntoView({block: 'center'})", player.find(id))
-    (box,) = player.boxes(f"#{id}")
-    return box["left"] + box["width"] / 2, box["top"] + box["height"] / 2
 
 
 @pytest.fixture
@@ -138,8 +131,8 @@ def test_arrows_on_the_focused_portrait_choose_any_state(user: Player) -> None:
     user.run("pendulum.reset(0.52, 0); document.getElementById('portrait').focus()")
     user.press(Keys.ARROW_RIGHT, Keys.ARROW_UP, Keys.ARROW_UP)
     state = user.state()
-    assert [state["theta"], state["thetadot"]] == pytest.approx([0.6, 1.0])
-    assert user.text("status") == "Held at 0.60 rad, 1.00 rad/s. Enter lets go."
+    assert [state["theta"], state["thetadot"]] == pytest.approx([0.4, 1.0])
+    assert user.text("status") == "Held at 0.40 rad, 1.00 rad/s. Enter lets go."
     assert not state["youDrive"]
     fine = ActionChains(user.driver, duration=0)
     fine.key_down(Keys.SHIFT).send_keys(Keys.ARROW_LEFT, Keys.ARROW_DOWN).key_up(Keys.SHIFT)
@@ -147,10 +140,10 @@ def test_arrows_on_the_focused_portrait_choose_any_state(user: Player) -> None:
     user.press(Keys.ENTER)
     assert not user.run("return pendulum.page.held")
     state = user.state()
-    assert [state["theta"], state["thetadot"], state["steps"]] == pytest.approx([0.59, 0.9, 0])
+    assert [state["theta"], state["thetadot"], state["steps"]] == pytest.approx([0.41, 0.9, 0])
     user.press(*[Keys.ARROW_LEFT] * 40, *[Keys.ARROW_DOWN] * 20)
     state = user.state()
-    assert state["theta"] == pytest.approx(0.6 - 40 * 0.1 + 2 * np.pi, abs=0.11)  # once around
+    assert state["theta"] == pytest.approx(0.4 + 40 * 0.1 - 2 * np.pi, abs=0.11)  # once around
     assert state["thetadot"] == -8
     user.press(Keys.TAB)  # leaving the portrait lets go too
     assert not user.run("return pendulum.page.held")

@@ -1,7 +1,7 @@
 "use strict";
 
-const DIRECTION_OF_KEY = { j: -1, arrowleft: -1, k: 0, l: 1, arrowright: 1 }; // of your effort
-// The directions of θ and θ̇ on the phase portrait.
+const DIRECTION_OF_KEY = { j: -1, k: 0, l: 1 }; // of your effort
+// To the right and up: of your effort, and of a move on the phase portrait.
 const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1] };
 const ONCE = [" ", "m", "h", "r", "t", "p"]; // keys that act once when they are held
 
@@ -79,6 +79,7 @@ class Controls {
     if (id === "portrait" && ARROWS[key]) this.#nudge(ARROWS[key], event.shiftKey);
     else if (page.heldByKey && (key === "enter" || key === " ")) page.letGo();
     else if (key in DIRECTION_OF_KEY) page.choose(DIRECTION_OF_KEY[key]);
+    else if (ARROWS[key]?.[0]) page.choose(ARROWS[key][0] * page.task.rightward);
     // Up and down scroll the page unless you drive.
     else if (upOrDown && page.episode.youDrive) page.choose(0);
     else if (key === " ") page.pause();
@@ -100,7 +101,8 @@ class Controls {
     const [angle, speed] = [task.angle(theta), thetadot].map((value, i) => {
       if (!direction[i]) return value;
       const step = (fine ? task.fineNudges : task.nudges)[i];
-      return (Math.round(value / step) + direction[i]) * step;
+      const sign = i ? 1 : task.rightward;
+      return (Math.round(value / step) + sign * direction[i]) * step;
     });
     page.putOnPortrait(task.angle(angle), speed, false, true);
   }

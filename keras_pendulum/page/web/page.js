@@ -39,21 +39,21 @@ class Page {
 
   /** Takes the steps that are due and draws. */
   frame(now, before) {
-    const { timeStep } = this.task;
+    const { stepTime } = this;
     requestAnimationFrame((later) => this.frame(later, now));
     const seconds = (now - before) / 1000;
     this.training?.advance(seconds);
     if (this.running && !this.held) {
       // Limited, so that a tab that was hidden does not rush through the missed steps.
-      this.waiting = Math.min(this.waiting + seconds, 4 * timeStep);
+      this.waiting = Math.min(this.waiting + seconds, 4 * stepTime);
       if (this.over) {
         this.resting += seconds; // time to read the score
-        this.waiting = this.resting < REST ? 0 : timeStep;
+        this.waiting = this.resting < REST ? 0 : stepTime;
       }
-      for (; this.waiting >= timeStep; this.waiting -= timeStep) this.step();
+      for (; this.waiting >= stepTime; this.waiting -= stepTime) this.step();
     }
     if (this.changed || (this.running && !calm.matches)) this.view.drawSwing();
-    this.map.aim(this.task.others?.(this.episode.state) ?? []);
+    this.map.aim(this.episode.state.slice(0, -2));
     if (this.map.work(8)) this.changeMap();
     if (this.changed) this.view.drawRest();
     this.training?.drawIfChanged(this.view.colours);
@@ -63,6 +63,11 @@ class Page {
   /** Whether all episodes are over: one may be shorter than the other. */
   get over() {
     return this.episodes.every(({ over }) => over);
+  }
+
+  /** The duration of a step on the clock, in s. */
+  get stepTime() {
+    return this.episode.youDrive ? this.task.drivenStep : this.task.timeStep;
   }
 
   /** Takes the next time step; after the last one, starts a new episode. */

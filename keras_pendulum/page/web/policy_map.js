@@ -5,23 +5,24 @@ class PolicyMap {
   constructor(policy, task) {
     this.policy = policy; // its method `effort` returns one for a state
     this.task = task;
-    this.size = task.mapSize; // columns of θ, rows of θ̇ from above, ends included
+    this.size = task.mapSize; // columns of θ as the portrait has them, rows of θ̇ from above
     this.efforts = new Float32Array(this.size ** 2);
-    this.aim([]);
+    this.others = null;
+    this.aim(task.aimed.map(() => 0));
   }
 
   #cells;
 
-  /** Chooses the other numbers of the states, such as the position of the cart. */
+  /** Chooses the other numbers of the states, such as the position of the cart; a small change is none. */
   aim(others) {
-    if (String(this.others) === String(others)) return;
+    if (this.others?.every((value, i) => Math.abs(value - others[i]) <= this.task.aimed[i])) return;
+    this.#cells = this.#coarseToFine(this.ready ? 4 : 16);
     this.others = others;
     this.ready = false;
-    this.#cells = this.#coarseToFine();
   }
 
   theta(column) {
-    return ((2 * column) / (this.size - 1) - 1) * this.task.largest[0];
+    return ((2 * column) / (this.size - 1) - 1) * this.task.rightward * this.task.largest[0];
   }
 
   thetadot(row) {
@@ -48,11 +49,11 @@ class PolicyMap {
     return true;
   }
 
-  *#coarseToFine() {
-    for (const width of [16, 8, 4, 2, 1]) {
+  *#coarseToFine(coarsest) {
+    for (let width = coarsest; width >= 1; width /= 2) {
       for (let row = 0; row < this.size; row += width) {
         for (let column = 0; column < this.size; column += width) {
-          const computed = width < 16 && row % (2 * width) === 0 && column % (2 * width) === 0;
+          const computed = width < coarsest && row % (2 * width) === 0 && column % (2 * width) === 0;
           if (!computed) yield [row, column, width];
         }
       }

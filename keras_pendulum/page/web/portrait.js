@@ -62,7 +62,8 @@ function drawPortrait(canvas, colours, task, pictureOf, paths) {
   const [left, right, top, bottom] = portraitEdges(width, height);
   const sharpness = canvas.width / width;
   const [largestAngle, largestSpeed] = task.largest;
-  const x = (theta) => left + ((theta / largestAngle + 1) / 2) * (right - left);
+  // What leans to the right is on the right.
+  const x = (theta) => left + (((task.rightward * theta) / largestAngle + 1) / 2) * (right - left);
   const y = (thetadot) => top + ((1 - thetadot / largestSpeed) / 2) * (bottom - top);
 
   context.save();

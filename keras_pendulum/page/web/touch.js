@@ -50,7 +50,8 @@ class Touch {
       const [left, right, top, bottom] = portraitEdges(width, height);
       const share = (event.clientX - x - left) / (right - left);
       const rise = (event.clientY - y - top) / (bottom - top);
-      return [2 * share - 1, 1 - 2 * rise].map((value, i) => clipped(value, 1) * task.largest[i]);
+      const place = [task.rightward * (2 * share - 1), 1 - 2 * rise];
+      return place.map((value, i) => clipped(value, 1) * task.largest[i]);
     };
     this.#drag(canvas, {
       down: (event) => page.putOnPortrait(...state(event), false),

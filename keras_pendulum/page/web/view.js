@@ -28,7 +28,7 @@ class View {
     let present = states.pop();
     // The drawing is one step behind: it moves from the previous state to the present one.
     if (page.running && !over && !calm.matches && states.length) {
-      const share = page.waiting / page.task.timeStep;
+      const share = page.waiting / page.stepTime;
       const before = states.at(-1);
       present = present.map((value, i) => before[i] + share * (value - before[i]));
     }
@@ -48,6 +48,7 @@ class View {
     element("step").textContent = `${episode.steps}/${task.episodeSteps}`;
     element("theta").textContent = shown(task.angle(theta), 2, true);
     element("thetadot").textContent = shown(thetadot, 2, true);
+    task.readings.forEach((id, i) => (element(id).textContent = shown(episode.state[i], 2, true)));
     page.episodes.forEach((each, i) => {
       element(`return-${i}`).textContent = shown(each.return, task.returnDigits);
     });

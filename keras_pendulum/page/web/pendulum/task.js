@@ -10,8 +10,10 @@ class Task {
   }
 
   timeStep = 0.05; // s
+  drivenStep = 0.05; // s on the clock when you drive
   episodeSteps = 200;
   maxEffort = 2; // N·m
+  rightward = -1; // the sign of θ to the right, and of the effort that moves it there
   returnDigits = 1;
   curveName = "reward per step";
   // The phase portrait.
@@ -19,12 +21,14 @@ class Task {
   angleTicks = [[-Math.PI, "−π"], [-Math.PI / 2, "−π/2"], [0, "0"], [Math.PI / 2, "π/2"], [Math.PI, "π"]];
   speedTicks = [-8, -4, 0, 4, 8];
   mapSize = 97;
+  aimed = []; // the state has no numbers but those of the map
   nudges = [0.1, 0.5]; // rad, rad/s, of a key
   fineNudges = [0.01, 0.1];
   effortTicks = [-2, -1, 0, 1, 2].map((torque) => [torque, shown(torque, 0, torque !== 0)]);
   effortAxis = "torque (N·m)";
   hanging = [Math.PI, 0];
   limits = [Infinity, MAX_SPEED]; // of the state [θ, θ̇]
+  readings = [];
 
   /** Returns a state at random, like Gymnasium. */
   randomStart() {
