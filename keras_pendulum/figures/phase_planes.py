@@ -69,6 +69,8 @@ def _draw_row(
         )
         axes.set_yticks(np.linspace(-speed, speed, 5).tolist())
         axes.set_xticks([-angle, 0, angle], [f"−{end}", "0 (upright)", end])
+        # What leans to the right is on the right.
+        axes.set_xlim(-angle * dynamics.rightward, angle * dynamics.rightward)
         axes.set(xlabel="θ (rad)", ylabel="θ̇ (rad/s)")
     return axes.figure.colorbar(image, ax=panels, label=label, fraction=0.1, pad=0.03)
 

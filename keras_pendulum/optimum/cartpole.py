@@ -39,6 +39,7 @@ class CartPoleSolution(KnownDynamics):
     effort: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
     largest_effort: ClassVar[float] = FORCE
+    rightward: ClassVar[int] = 1
     phase_ends: ClassVar[tuple[float, float]] = (LARGEST_ANGLE, 3.0)
     any_effort: ClassVar[bool] = False
     observation_sizes: ClassVar[tuple[float, ...]] = (LARGEST_POSITION, 3.0, LARGEST_ANGLE, 3.0)

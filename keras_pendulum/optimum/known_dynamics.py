@@ -32,6 +32,7 @@ class KnownDynamics(Solution):
     effort: ClassVar[str]  # "torque" or "force"
     unit: ClassVar[str]  # of an effort
     largest_effort: ClassVar[float]
+    rightward: ClassVar[int]  # the sign of θ to the right, and of the effort that moves it there
     phase_ends: ClassVar[tuple[float, float]]  # largest θ in rad and θ̇ in rad/s of phase planes
     any_effort: ClassVar[bool]  # whether the environment takes those between the outputs' ones, too
     observation_sizes: ClassVar[tuple[float, ...]]  # usual largest absolute values, [D]

@@ -33,6 +33,7 @@ class PendulumSolution(KnownDynamics):
     effort: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N·m"
     largest_effort: ClassVar[float] = MAX_TORQUE
+    rightward: ClassVar[int] = -1
     phase_ends: ClassVar[tuple[float, float]] = (math.pi, MAX_SPEED)
     any_effort: ClassVar[bool] = True
     observation_sizes: ClassVar[tuple[float, ...]] = (1.0, 1.0, MAX_SPEED)

@@ -24,6 +24,7 @@ class PlayedCartPole(PlayedTask):
     effort: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
     largest_effort: ClassVar[float] = FORCE
+    rightward: ClassVar[int] = 1
     directions: ClassVar[tuple[str, str]] = ("left", "right")
     keys: ClassVar[str] = (
         "j or Left: push left      k or Down: alternate      l or Right: push right"

@@ -88,6 +88,7 @@ def draw_portrait(
 
     def pixel(state: tuple[float, float]) -> tuple[float, float]:
         x, y = (value / end for value, end in zip(state, largest, strict=True))
+        x *= task.rightward  # what leans to the right is on the right
         return frame.centerx + x * frame.width / 2, frame.centery - y * frame.height / 2
 
     for angle, name in task.angles.items():

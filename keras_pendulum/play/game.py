@@ -25,14 +25,13 @@ class Key(Enum):
 
     NEGATIVE = auto()  # effort
     POSITIVE = auto()
+    LEFT = auto()  # moves to the left what is upright
+    RIGHT = auto()
     NEUTRAL = auto()
     HOLD = auto()  # switches between keys that act until the next one, and while they are held
     RESTART = auto()
     CONTINUE = auto()
     LEAVE = auto()
-
-
-DIRECTIONS = {Key.NEGATIVE: -1, Key.POSITIVE: 1, Key.NEUTRAL: 0}
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,9 @@ class Game:
     ) -> None:
         self._task, self._policy, self._print_line = task, policy, print_line
         self._print_steps = print_steps
+        right = task.rightward
+        self._directions = {Key.NEGATIVE: -1, Key.POSITIVE: 1, Key.NEUTRAL: 0}
+        self._directions |= {Key.LEFT: -right, Key.RIGHT: right}
         self._env = task.task.make_env()
         self.finished = self._held = False
         self._stage = _Stage.READY
@@ -118,8 +120,8 @@ class Game:
         elif key is Key.HOLD:
             self._held = not self._held
             self._direction = 0
-        elif key in DIRECTIONS and stage in (_Stage.READY, _Stage.PLAYER):
-            self._direction = DIRECTIONS[key]
+        elif key in self._directions and stage in (_Stage.READY, _Stage.PLAYER):
+            self._direction = self._directions[key]
             self._stage = _Stage.PLAYER
         elif key is Key.CONTINUE and stage is _Stage.READY:
             self._stage = _Stage.PLAYER
@@ -132,7 +134,7 @@ class Game:
 
     def release(self, key: Key) -> None:
         """Ends the effort of a key that is released, where keys act only while they are held."""
-        if self._held and DIRECTIONS.get(key) == self._direction:
+        if self._held and self._directions.get(key) == self._direction:
             self._direction = 0
 
     def advance(self) -> None:

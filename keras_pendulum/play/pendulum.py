@@ -23,8 +23,9 @@ class PlayedPendulum(PlayedTask):
     effort: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N·m"
     largest_effort: ClassVar[float] = MAX_TORQUE
+    rightward: ClassVar[int] = -1
     directions: ClassVar[tuple[str, str]] = ("clockwise", "counterclockwise")
-    keys: ClassVar[str] = "j or Left: -2 N·m      k or Down: 0      l or Right: +2 N·m"
+    keys: ClassVar[str] = "l or Left: +2 N·m      k or Down: 0      j or Right: -2 N·m"
     return_digits: ClassVar[int] = 1
     angles: ClassVar[dict[float, str]] = {-math.pi: "-180°", 0: "0° (upright)", math.pi: "180°"}
     speeds: ClassVar[tuple[float, ...]] = (-MAX_SPEED, -4, 0, 4, MAX_SPEED)

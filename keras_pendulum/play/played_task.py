@@ -23,6 +23,7 @@ class PlayedTask(ABC):
     effort: ClassVar[str]  # what a key sets, such as the torque
     unit: ClassVar[str]
     largest_effort: ClassVar[float]
+    rightward: ClassVar[int]  # the sign of θ to the right, and of the effort that moves it there
     directions: ClassVar[tuple[str, str]]  # of a negative and of a positive effort
     keys: ClassVar[str]
     return_digits: ClassVar[int]  # after the decimal point

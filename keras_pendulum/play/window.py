@@ -23,9 +23,9 @@ from keras_pendulum.play.game import FRAMES_PER_SECOND, Game, Key, View
 
 KEYS = {
     pygame.K_j: Key.NEGATIVE,
-    pygame.K_LEFT: Key.NEGATIVE,
+    pygame.K_LEFT: Key.LEFT,
     pygame.K_l: Key.POSITIVE,
-    pygame.K_RIGHT: Key.POSITIVE,
+    pygame.K_RIGHT: Key.RIGHT,
     pygame.K_k: Key.NEUTRAL,
     pygame.K_DOWN: Key.NEUTRAL,
     pygame.K_UP: Key.NEUTRAL,

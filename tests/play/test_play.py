@@ -107,7 +107,7 @@ def gymnasium_rewards(torques: list[float], seed: int, gravity: float = 1.0) -> 
     return [float(env.step(np.array([torque]))[1]) for torque in torques]
 
 
-KEYS = {"j": -2, "l": 2, "k": 0, "LEFT": -2, "RIGHT": 2, "DOWN": 0, "UP": 0}
+KEYS = {"j": -2, "l": 2, "k": 0, "LEFT": 2, "RIGHT": -2, "DOWN": 0, "UP": 0}
 
 
 @pytest.mark.parametrize(("key", "torque"), KEYS.items())
@@ -296,7 +296,7 @@ def portrait(path: Any, earlier: Any = ()) -> Any:
 
 
 def test_portrait_shows_the_path_and_that_of_the_player() -> None:
-    start, lines = (1.0, 0.0), [(1.0, 0.0), (0.5, 4.0), (-0.5, 4.0)]
+    start, lines = (-1.0, 0.0), [(-1.0, 0.0), (-0.5, 4.0), (0.5, 4.0)]
     pictures = (portrait([start]), portrait(lines), portrait([start], lines))
     empty, path, earlier = (each[700:800, 140:220].sum(axis=2).min() for each in pictures)
     assert path < earlier < empty  # the darkest pixel
@@ -569,7 +569,7 @@ def test_keys_drive_the_pendulum_in_a_real_window(screen: Environment, tmp_path:
     words = command_line("play", "--against", "reference", "--print-steps", "--seed", "5")
     with WindowCommand(screen, tmp_path, words) as game:
         game.wait_for_window()
-        for key, torque in (("j", "-2"), ("l", "2"), ("k", "0"), ("Left", "-2"), ("Right", "2")):
+        for key, torque in (("j", "-2"), ("l", "2"), ("k", "0"), ("Left", "2"), ("Right", "-2")):
             game.press(key)
             game.wait_for_torque(torque)
         game.press("r")
