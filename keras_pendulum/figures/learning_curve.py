@@ -33,6 +33,7 @@ def draw_learning_curve(
     history: Sequence[EpisodeRecord],
     task: Task,
     reference_returns: Mapping[str, float],
+    episodes: int | None = None,
 ) -> None:
     """Draws a dot for each episode, their mean over 10 episodes, and horizontal lines.
 
@@ -44,6 +45,7 @@ def draw_learning_curve(
         task: of the run.
         reference_returns: mean returns of an episode of the same length, by name. Each becomes a
             horizontal line with its name and number in the legend.
+        episodes: that the axis spans; None takes those of the history.
     """
     values = curve_values(history, task)
     axes.plot(values, ".", color="0.6", markersize=4, label="one episode")
@@ -63,7 +65,7 @@ def draw_learning_curve(
         axes.axhline(height, color=color, linestyle=style, linewidth=width, label=label)
     axes.autoscale(axis="y")  # without it, a line can coincide with the frame
     axes.set_ylabel(task.curve_label)
-    draw_episode_axis(axes, len(values))
+    draw_episode_axis(axes, episodes or len(values))
     # The legend is above the axes, where it hides no episode.
     axes.legend(
         loc="lower left",

@@ -75,10 +75,11 @@ def draw_live(
     task: Task,
     reference_returns: Mapping[str, float],
     title: str,
+    episodes: int,
 ) -> bytes:
     """Returns a PNG with the learning curve of the episodes so far, and their ε.
 
-    Args: those of `draw_run`.
+    Args: those of `draw_run`, and the number of all episodes, which the axes span.
     """
     from matplotlib.figure import Figure
 
@@ -91,8 +92,9 @@ def draw_live(
             width_ratios=(2, 1),
             gridspec_kw={"left": 0.1, "right": 0.97, "bottom": 0.13, "top": 0.76, "wspace": 0.42},
         )
-        draw_learning_curve(curve, history, task, reference_returns)
+        draw_learning_curve(curve, history, task, reference_returns, episodes)
         _draw_epsilon(epsilon, history)
+        draw_episode_axis(epsilon, episodes)
         return png(figure)
 
 

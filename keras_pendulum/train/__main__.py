@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import signal
 import sys
 import time
@@ -118,7 +119,11 @@ def _train(arguments: argparse.Namespace) -> int:
             )
     finally:
         progress.end()
-    print(next_lines(config, result, folder, new_episodes=report.new_episodes))
+    print(next_lines(config, result, folder, new_episodes=report.new_episodes), flush=True)
+    if live and live.is_open and not interrupt.asked:
+        print("The window of the learning curve is open: close it to end", flush=True)
+        with contextlib.suppress(KeyboardInterrupt):  # Ctrl-C closes it, too
+            live.wait_until_closed()
     return 130 if interrupt.asked else 0
 
 

@@ -48,6 +48,16 @@ class LivePlot(Listener):
         if self._history and not self._canvas.closed():
             self._draw()
 
+    def wait_until_closed(self) -> None:
+        """Returns when the user has closed the window; at once where there is none."""
+        while self.is_open:
+            time.sleep(0.05)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a window that the user can close."""
+        return self._canvas.is_window and not self._canvas.closed()
+
     def _draw(self) -> None:
         self._canvas.show(self._picture())
         self._drawn = time.monotonic()
@@ -59,12 +69,14 @@ class LivePlot(Listener):
         if self._levels is None:
             self._levels = reference_returns(self.config)
         title = run_title(self.config)
-        return draw_live(self._history, self.config.task, self._levels, title)
+        return draw_live(self._history, self.config.task, self._levels, title, self.config.episodes)
 
 
 class _NotebookOutput:
     def __init__(self) -> None:
         self._handle: Any = None
+
+    is_window = False  # the output of a cell stays
 
     def show(self, png: bytes) -> None:
         """Replaces the picture."""
@@ -84,6 +96,10 @@ class _Window:
         require_display()
         self._screen: Any = None
         self._closed = False
+
+    @property
+    def is_window(self) -> bool:
+        return self._screen is not None
 
     def show(self, png: bytes) -> None:
         import io

@@ -34,7 +34,7 @@ def report() -> bytes:
     "draw",
     [
         lambda: draw_run(HISTORY, Pendulum(), {}, {}, "a run"),
-        lambda: draw_live(HISTORY, Pendulum(), {}, "a run"),
+        lambda: draw_live(HISTORY, Pendulum(), {}, "a run", 9),
         report,
     ],
     ids=["run", "live", "report"],

@@ -85,6 +85,36 @@ def test_closed_window_is_not_opened_again(window: live_plot.LivePlot) -> None:
     assert not pygame.display.get_init()
 
 
+def test_window_stays_open_after_the_run_until_it_is_closed(
+    window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window.wait_until_closed()  # no window yet
+    window.on_episode(record(0))
+    window.on_end()
+    waits = []
+
+    def close_at_the_third(seconds: float) -> None:
+        waits.append(seconds)
+        if len(waits) == 3:
+            pygame.event.post(pygame.event.Event(pygame.QUIT))
+
+    monkeypatch.setattr(live_plot.time, "sleep", close_at_the_third)
+    window.wait_until_closed()
+    assert len(waits) == 3
+    assert not pygame.display.get_init()
+
+
+def test_axes_span_the_whole_run_from_the_first_episode_on(
+    window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window.config = kp.preset("reference", episodes=300)
+    monkeypatch.setattr(window, "_drawn", math.inf)  # the window draws nothing
+    window.on_episode(record(0))
+    for axes in figure_of(window._picture).axes:
+        low, high = axes.get_xlim()
+        assert low < 0 < 299 < high < 330
+
+
 def test_live_plot_without_a_display_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
         monkeypatch.delenv(name, raising=False)
