@@ -37,7 +37,7 @@ def draw_learning_curve(
 ) -> None:
     """Draws a dot for each episode, their mean over 10 episodes, and horizontal lines.
 
-    CartPole has one more line, the mean over 100 episodes.
+    The episodes before the first update are shaded. CartPole has one more line, the mean over 100 episodes.
 
     Args:
         axes: to draw on.
@@ -48,6 +48,9 @@ def draw_learning_curve(
         episodes: that the axis spans; None takes those of the history.
     """
     values = curve_values(history, task)
+    without = sum(record.updates == 0 for record in history)
+    if without:
+        axes.axvspan(-0.5, without - 0.5, color="0.93", label="before the first update")
     axes.plot(values, ".", color="0.6", markersize=4, label="one episode")
     marker = "o" if len(values) == 1 else ""  # a line needs two episodes
     name = f"mean of {MEAN_OVER} episodes"

@@ -78,3 +78,18 @@ def test_legend_has_the_number_of_each_line() -> None:
 
 def test_trailing_mean_has_fewer_values_at_the_start() -> None:
     assert trailing_mean([4.0, 2.0, 0.0, 8.0], 2).tolist() == [4.0, 3.0, 1.0, 4.0]
+
+
+def test_episodes_before_the_first_update_are_shaded() -> None:
+    history = [
+        EpisodeRecord(i, -1.0, -200.0, 0.5, 0.1, 200 * (i + 1), max(0, i - 2), 0.1)
+        for i in range(6)
+    ]
+    axes = Figure().subplots()
+    draw_learning_curve(axes, history, Pendulum(), {})
+    (shade,) = axes.patches
+    left, right = shade.get_extents().transformed(axes.transData.inverted()).intervalx
+    assert (left, right) == pytest.approx((-0.5, 2.5))  # three episodes without an update
+    axes = Figure().subplots()
+    draw_learning_curve(axes, history[3:], Pendulum(), {})
+    assert not axes.patches
