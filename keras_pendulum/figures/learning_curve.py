@@ -37,7 +37,8 @@ def draw_learning_curve(
 ) -> None:
     """Draws a dot for each episode, their mean over 10 episodes, and horizontal lines.
 
-    The episodes before the first update are shaded. CartPole has one more line, the mean over 100 episodes.
+    The episodes before the first update are shaded. CartPole has one more line, the mean over 100
+    episodes.
 
     Args:
         axes: to draw on.
