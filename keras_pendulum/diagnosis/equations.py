@@ -98,8 +98,8 @@ def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, 
         declared: its values for the declared task.
     """
     ends = not visited.dynamics.task.never_terminates
-    offsets = (each for each in (_small_offsets if ends else _offsets)(declared) if each.offset)
-    for equation in (*EQUATIONS, *offsets, *_changes(visited, declared)):
+    found = (each for each in (_with_ends if ends else _offsets)(declared) if each.offset)
+    for equation in (*EQUATIONS, *found, *_changes(visited, declared)):
         values = visited.backup(**equation.change) if equation.change else declared
         yield agreement(values, equation.target(values)), equation
 
@@ -111,6 +111,20 @@ def _next(values: Callable[[Array], Array]) -> Callable[[Backup], Array]:
 
 _TARGET = "Its fixed point has other values, so the greedy policy follows another task."
 _TAKE_MAXIMUM = "Take the maximum over the actions: axis 1 of [B, A], of the next state's values."
+
+_ZERO_OTHERS = Equation(
+    "wrong-loss",
+    "zero-others",
+    "(r + γ·max Q(s′, ·)) / A",
+    lambda b: b.right / b.q.shape[1],
+    "The loss compares the outputs that did not act with zero. So each value is the target "
+    "times the share of its action in the batches, about 1/A.",
+    "Compare only the output of the stored action: take Q(s, a), or give the others their own "
+    "values as targets.",
+    largest_error=0.4,
+    share=0.1,
+    flat=np.inf,
+)
 
 EQUATIONS = (
     Equation(
@@ -163,19 +177,7 @@ EQUATIONS = (
         "r + γ·max Q(s′, ·), also at an end",
         lambda b: b.reward + b.discount * b.next_q.max(axis=2),
     ),
-    Equation(
-        "wrong-loss",
-        "zero-others",
-        "(r + γ·max Q(s′, ·)) / A",
-        lambda b: b.right / b.q.shape[1],
-        "The loss compares the outputs that did not act with zero. So each value is the target "
-        "times the share of its action in the batches, about 1/A.",
-        "Compare only the output of the stored action: take Q(s, a), or give the others their own "
-        "values as targets.",
-        largest_error=0.4,
-        share=0.1,
-        flat=np.inf,
-    ),
+    _ZERO_OTHERS,
     Equation(
         "wrong-loss",
         "same-target",
@@ -252,8 +254,11 @@ def _offset_equations(declared: Backup) -> Iterator[Equation]:
     )
 
 
-def _small_offsets(declared: Backup) -> Iterator[Equation]:
-    """Yields the same for a task whose reward is constant: then Q - r alone shows them."""
+def _with_ends(declared: Backup) -> Iterator[Equation]:
+    """Yields the same for a task whose reward is constant: then Q - r alone shows them.
+
+    There, the shares of the actions in the batches differ from state to state. But their sum is 1.
+    """
     offset, last = declared.offset, declared.q.shape[1] - 1
     mean, spread = float(offset.mean()), float(offset.std())
     size = float(np.abs(declared.reward).mean())
@@ -273,6 +278,14 @@ def _small_offsets(declared: Backup) -> Iterator[Equation]:
         yield replace(
             equation, offset=offsets[equation.variant or equation.name], largest_error=1.2
         )
+    lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
+    yield replace(
+        _ZERO_OTHERS,
+        formula="sum of Q(s, ·) / (r + γ·max Q(s′, ·)) = 1",
+        target=lambda b: b.q / (b.q / b.right).sum(axis=1, keepdims=True),
+        share=0.35,
+        offset=lowest < 0.9 * size and highest > 2.5 * size,
+    )
 
 
 def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:

@@ -10,6 +10,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.optimum.cartpole import CartPoleSolution
+from keras_pendulum.optimum.cartpole_dynamics import has_fallen, step_forces
 
 EXACT = CartPoleSolution(CartPole())
 TABLE = EXACT.table(0.95)
@@ -19,6 +20,30 @@ FORCES = np.array([-10.0, 10.0])
 def exact_values(observations: Any) -> Any:
     """Returns the exact Q-values [B, 2] for γ = 0.95."""
     return EXACT.exact_q(TABLE, 0.95, EXACT.states_of(observations), FORCES)
+
+
+def values_with_zeros(observations: Any) -> Any:
+    """Returns the fixed point [B, 2] of a loss that compares the output that did not act with zero.
+
+    85 % of the stored actions push to the side to which the pole leans, which is too late.
+    """
+
+    def pushes(states: Any) -> Any:
+        return (states[:, 2] > 0).astype(int)
+
+    def value(states: Any) -> Any:
+        total, factor, standing = np.zeros(len(states)), 0.85, ~has_fallen(states)
+        for _ in range(40):
+            total += factor * standing
+            factor *= 0.85 * 0.95
+            states = step_forces(states, FORCES[pushes(states)][:, None]).state[:, 0]
+            standing &= ~has_fallen(states)
+        return total
+
+    states = EXACT.states_of(observations)
+    following = step_forces(states, FORCES).state
+    shares = np.where(np.arange(2) == pushes(states)[:, None], 0.85, 0.15)
+    return shares * (1 + 0.95 * np.stack([value(following[:, i]) for i in range(2)], axis=1))
 
 
 def first(values: Any, **options: Any) -> str:
@@ -36,6 +61,7 @@ def first(values: Any, **options: Any) -> str:
         ("missing-end", lambda o: 20 + 0.001 * np.sin(o[:, :2])),
         ("no-bootstrapping", lambda o: 1 + 0.001 * np.sin(o[:, :2])),
         ("wrong-loss (batch-broadcast)", lambda o: 9 + 0.001 * np.sin(o[:, :2])),
+        ("wrong-loss (zero-others)", values_with_zeros),
         ("broken-network", lambda o: np.full((len(o), 2), np.nan)),
     ],
 )
