@@ -1,9 +1,10 @@
-"""The outputs of examples/tour.ipynb, which ships with them.
+"""The outputs of examples/step_by_step.ipynb, which ships with them, and its page in docs.
 
     python -m benchmarks.pages.notebook
 
 Executes all cells in an empty folder and stores their outputs, with pictures of few colours and
-without the times of the execution. It takes some minutes.
+without the times of the execution. Then it writes docs/step_by_step.md: the same cells with their
+outputs. It takes some minutes.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from PIL import Image
 
 from benchmarks.result_files import ROOT
 
-TOUR = ROOT / "examples" / "tour.ipynb"
+NOTEBOOK = ROOT / "examples" / "step_by_step.ipynb"
+PAGE = ROOT / "docs" / "step_by_step.md"
 _WIDTH = 720  # pixels of a picture
 _COLORS = 64
 
@@ -28,7 +30,8 @@ _COLORS = 64
 def execute(notebook: Any, folder: Path, **options: Any) -> None:
     """Executes the cells of a notebook in a folder; `options` are those of `execute`."""
     resources = {"metadata": {"path": str(folder)}}
-    NotebookClient(notebook, timeout=900, resources=resources).execute(**options)
+    client = NotebookClient(notebook, timeout=900, resources=resources, coalesce_streams=True)
+    client.execute(**options)
 
 
 def smaller(png: str) -> str:
@@ -42,9 +45,43 @@ def smaller(png: str) -> str:
     return base64.b64encode(stream.getvalue()).decode()
 
 
+def page_of(notebook: Any) -> tuple[str, dict[str, bytes]]:
+    """Returns the page of an executed notebook, and its pictures by their names in docs."""
+    parts: list[str] = []
+    pictures: dict[str, bytes] = {}
+    heading = ""
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            parts.append(cell.source.replace("](../docs/", "]("))
+            for line in cell.source.splitlines():
+                heading = line.lstrip("# ") if line.startswith("#") else heading
+            continue
+        parts.append(f"```py\n{cell.source}\n```")
+        for output in cell.outputs:
+            if output.output_type == "stream":
+                parts.append(f"```text\n{output.text.rstrip()}\n```")
+            elif "image/png" in output.data:
+                name = f"{PAGE.stem}/{len(pictures) + 1}.png"
+                pictures[name] = base64.b64decode(output.data["image/png"])
+                parts.append(f"![{heading}]({name})")
+    return "\n\n".join(parts) + "\n", pictures
+
+
+def write_page(notebook: Any) -> None:
+    """Writes the page of an executed notebook, and its pictures in place of the old ones."""
+    page, pictures = page_of(notebook)
+    PAGE.write_text(page, encoding="utf-8")
+    folder = PAGE.with_suffix("")
+    folder.mkdir(exist_ok=True)
+    for old in folder.iterdir():
+        old.unlink()
+    for name, picture in pictures.items():
+        (PAGE.parent / name).write_bytes(picture)
+
+
 def main() -> None:
-    """Executes the notebook and stores its outputs."""
-    notebook: Any = nbformat.read(TOUR, as_version=4)  # type: ignore[no-untyped-call]
+    """Executes the notebook, stores its outputs, and writes the page."""
+    notebook: Any = nbformat.read(NOTEBOOK, as_version=4)  # type: ignore[no-untyped-call]
     metadata = dict(notebook.metadata)
     with tempfile.TemporaryDirectory() as folder:
         execute(notebook, Path(folder))
@@ -54,7 +91,8 @@ def main() -> None:
         for output in cell.get("outputs", []):
             if "image/png" in output.get("data", {}):
                 output.data["image/png"] = smaller(output.data["image/png"])
-    nbformat.write(notebook, TOUR)  # type: ignore[no-untyped-call]
+    nbformat.write(notebook, NOTEBOOK)  # type: ignore[no-untyped-call]
+    write_page(notebook)
 
 
 if __name__ == "__main__":

@@ -42,8 +42,11 @@ def test_index_links_to_each_page_and_contains_it() -> None:
     pages = [path.name for path in ROOT.glob("docs/*.md") if path.name != "index.md"]
     linked = [link for link in links(index) if link.endswith(".md")]
     assert sorted(linked) == sorted(pages)
-    (contained,) = re.findall(r"^```\{toctree\}\n:hidden:\n\n(.*?)^```$", index, re.M | re.S)
-    assert contained.split() == [link.removesuffix(".md") for link in linked]
+    tree = r"^```\{toctree\}\n:hidden:\n:caption: ([^\n]+)\n\n(.*?)^```$"
+    groups = re.findall(tree, index, re.M | re.S)
+    contained = [name for _, names in groups for name in names.split()]
+    assert contained == [link.removesuffix(".md") for link in linked]
+    assert [caption for caption, _ in groups] == re.findall(r"^## (.+)$", index, re.M)
 
 
 def test_index_begins_like_the_readme() -> None:
