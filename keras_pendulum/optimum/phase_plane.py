@@ -16,7 +16,8 @@ from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.optimum.discounted import exact_q
 from keras_pendulum.optimum.dynamics import TORQUES
-from keras_pendulum.optimum.known_dynamics import Array, KnownDynamics
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
+from keras_pendulum.optimum.solution import Array
 from keras_pendulum.optimum.solutions import solution
 from keras_pendulum.optimum.value_iteration import solve
 

@@ -98,7 +98,7 @@ def test_window_stays_open_after_the_run_until_it_is_closed(
         if len(waits) == 3:
             pygame.event.post(pygame.event.Event(pygame.QUIT))
 
-    monkeypatch.setattr(live_plot.time, "sleep", close_at_the_third)
+    monkeypatch.setattr("time.sleep", close_at_the_third)
     window.wait_until_closed()
     assert len(waits) == 3
     assert not pygame.display.get_init()

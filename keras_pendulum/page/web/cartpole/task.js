@@ -22,7 +22,7 @@ class Task {
   // The phase portrait.
   largest = [LARGEST_ANGLE, 3]; // θ in rad, θ̇ in rad/s
   angleTicks = [-0.2, -0.1, 0, 0.1, 0.2].map((angle) => [angle, shown(angle, angle && 1)]);
-  speedTicks = [-3, -1.5, 0, 1.5, 3];
+  speedTicks = [-3, 0, 3];
   mapSize = 49;
   aimed = [0.1, 0.3]; // m, m/s: as far x and ẋ may be from those of the map
   nudges = [0.02, 0.2]; // rad, rad/s, of a key
