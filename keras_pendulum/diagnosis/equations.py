@@ -99,7 +99,8 @@ def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, 
     """
     ends = not visited.dynamics.task.never_terminates
     found = (each for each in (_with_ends if ends else _offsets)(declared) if each.offset)
-    for equation in (*EQUATIONS, *found, *_changes(visited, declared)):
+    equations = [each for each in EQUATIONS if not ends or each.variant != "same-state"]
+    for equation in (*equations, *found, *_changes(visited, declared)):
         values = visited.backup(**equation.change) if equation.change else declared
         yield agreement(values, equation.target(values)), equation
 
@@ -267,7 +268,8 @@ def _with_ends(declared: Backup) -> Iterator[Equation]:
     small = (
         not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
     )
-    index = small and mean > 0 and not declared.offset_is_smooth
+    # The values of a network that has never learned are smooth, and smaller.
+    index = small and (mean > 0.5 * size or (mean > 0 and not declared.offset_is_smooth))
     for equation in _offset_equations(declared):
         offsets = {
             "no-bootstrapping": none,
@@ -275,9 +277,9 @@ def _with_ends(declared: Backup) -> Iterator[Equation]:
             "index-for-value": index,
             "batch-max": mean > 2 * size and spread < 0.12 * mean and end < 0.5 * mean,
         }
-        yield replace(
-            equation, offset=offsets[equation.variant or equation.name], largest_error=1.2
-        )
+        name = equation.variant or equation.name
+        equation = replace(equation, offset=offsets[name], largest_error=1.6)
+        yield _highest_everywhere(equation) if name == "batch-max" else equation
     lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
     yield replace(
         _ZERO_OTHERS,
@@ -285,6 +287,20 @@ def _with_ends(declared: Backup) -> Iterator[Equation]:
         target=lambda b: b.q / (b.q / b.right).sum(axis=1, keepdims=True),
         share=0.35,
         offset=lowest < 0.9 * size and highest > 2.5 * size,
+    )
+
+
+def _highest_everywhere(equation: Equation) -> Equation:
+    """Returns `batch-max` for a constant reward: there, `same-state` has the same values."""
+    return replace(
+        equation,
+        variant="batch-max or same-state",
+        share=0.5,
+        explanation="All values are nearly the highest possible one, but not those of a step that "
+        "ends the episode. Either the target takes one maximum for the whole batch, or the values "
+        "of the state itself in place of the next one.",
+        remedy="Give the maximum its axis: max(axis=1) of [B, A] is [B]. And store (s, a, r, s′) "
+        "before s = s′.",
     )
 
 

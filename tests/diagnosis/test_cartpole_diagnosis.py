@@ -46,6 +46,16 @@ def values_with_zeros(observations: Any) -> Any:
     return shares * (1 + 0.95 * np.stack([value(following[:, i]) for i in range(2)], axis=1))
 
 
+def constant_values(future: float) -> Any:
+    """Returns a function of Q-values [B, 2]: 1 at an end, else 1 and about the same future."""
+
+    def values(observations: Any) -> Any:
+        ended = step_forces(EXACT.states_of(observations), FORCES).terminated
+        return 1 + np.where(ended, 0, future * (1 + 0.05 * np.sin(20 * observations[:, :2])))
+
+    return values
+
+
 def first(values: Any, **options: Any) -> str:
     agent = kp.q_function(lambda o: values(o[:, :4]), name="agent")
     found = kp.diagnose(agent, environment="CartPole-v1", discount=0.95, **options).findings
@@ -61,6 +71,9 @@ def first(values: Any, **options: Any) -> str:
         ("missing-end", lambda o: 20 + 0.001 * np.sin(o[:, :2])),
         ("no-bootstrapping", lambda o: 1 + 0.001 * np.sin(o[:, :2])),
         ("wrong-loss (batch-broadcast)", lambda o: 9 + 0.001 * np.sin(o[:, :2])),
+        ("wrong-target (batch-max or same-state)", constant_values(18.0)),
+        ("wrong-target (index-for-value)", constant_values(0.8)),
+        ("wrong-target (frozen-target)", lambda o: 1.1 + 0.05 * o[:, 2:] + 0.05 * o[:, :2]),
         ("wrong-loss (zero-others)", values_with_zeros),
         ("broken-network", lambda o: np.full((len(o), 2), np.nan)),
     ],
