@@ -50,6 +50,7 @@ def training_content(folder: RunFolder, network: DQN) -> dict[str, Any] | None:
     shapes = [array.shape for array in network.get_weights()]
     return {
         "episodes": [*(each.episodes for each in before), len(history)],
+        "untrained": sum(record.updates == 0 for record in history),
         "curve": _curve(curve_values(history, recorded.config.task)),
         "networks": [_encode(each.weights, shapes) for each in before],
     }

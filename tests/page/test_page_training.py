@@ -55,12 +55,15 @@ def test_slider_shows_each_network_of_the_run(run: Path, page: str, player: Play
     player.run("pendulum.reset(2, 0.5)")
     player.find("snapshot").send_keys(Keys.HOME)
     assert shown_episode(player) == "episode 0 of 8"
+    assert player.text("training-text").endswith(", no update yet")
     final = kp.load_weights(run / "pendulum_weight.h5")
     history = load_recorded_run(run / "pendulum_weight.h5").history
     observation = [np.cos(2.0), np.sin(2.0), 0.5]
     values = []
     for each in read_snapshots(run / "pendulum_weight_snapshots.h5", final, history):
         assert shown_episode(player) == f"episode {each.episodes} of 8"
+        trained = each.episodes > sum(record.updates == 0 for record in history)
+        assert ("no update" in player.text("training-text")) != trained
         shapes = [array.shape for array in final.get_weights()]
         ends = np.cumsum([np.prod(shape) for shape in shapes])[:-1]
         parts = np.split(each.weights.astype(np.float32), ends)

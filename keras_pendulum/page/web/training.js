@@ -9,14 +9,14 @@ const SIX_BITS = new Uint8Array(128); // by the code of the character
 class Training {
   /**
    * @param {object} recorded the content of the page. Its `training` has `episodes`, after which
-   *   the networks were kept; `curve`, the rewards of a step at even distances from the first to the
+   *   the networks were kept; `untrained`, the episodes before the first update; `curve`, the rewards of a step at even distances from the first to the
    *   last episode; and `networks`, all but the last one.
    * @param {Network} last the network after the last of the episodes.
    * @param {Task} task
    */
   constructor(recorded, last, task) {
-    const { episodes, curve, networks } = recorded.training;
-    Object.assign(this, { recorded, episodes, curve, task });
+    const { episodes, untrained, curve, networks } = recorded.training;
+    Object.assign(this, { recorded, episodes, untrained, curve, task });
     if (networks.length !== episodes.length - 1) throw new Error("a network of its training is missing");
     this.shown = networks.length;
     this.playing = false;
@@ -87,7 +87,9 @@ class Training {
     slider.value = this.shown;
     slider.setAttribute("aria-valuetext", `episode ${here} of ${end}`);
     const reward = curveValue(this.curve, here / end);
-    element("training-text").textContent = `episode ${here} of ${end}: ${this.task.curveName} ${shown(reward, 2)}`;
+    const untrained = here <= this.untrained ? ", no update yet" : "";
+    element("training-text").textContent =
+      `episode ${here} of ${end}: ${this.task.curveName} ${shown(reward, 2)}${untrained}`;
     element("play-training").firstElementChild.textContent = this.playing ? "Stop" : "Play training";
     this.changed = true;
   }
