@@ -18,6 +18,7 @@ from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.q_policies import DQNPolicy
+from keras_pendulum.page.learning import learning_content
 from keras_pendulum.page.task_content import FOLDERS, optimum_content
 from keras_pendulum.storage.load_weights import recorded_return
 from keras_pendulum.storage.run_info import RunInfo
@@ -52,6 +53,7 @@ def build_page(
         "against": None,
         "training": training,
         "optimum": optimum_content(task),
+        "learning": learning_content(task),
     }
     if name is not None:
         content["name"] = name
