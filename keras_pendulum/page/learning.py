@@ -13,6 +13,7 @@ from keras_pendulum.optimum.solutions import SOLUTIONS
 from keras_pendulum.train.evaluations import SEEDS
 
 _SMALL = (64, 64)  # hidden units; a run of `reference` takes about 16 s in a browser
+_OTHER_SIZES = [(16, 16), (128, 64), (512, 256, 128)]  # that the page offers, too
 _EVALUATE_EVERY = 25  # episodes
 # Settings that no Config has: each changes the program to one with a fault.
 OWN_SETTINGS: dict[str, Any] = {
@@ -146,4 +147,5 @@ def learning_content(task: Task) -> dict[str, Any]:
         "action_count": task.action_count(config.torque_count),
         "starts": SOLUTIONS[task.environment](task).starts(SEEDS).tolist(),
         "switches": switches,
+        "networks": _OTHER_SIZES,
     }

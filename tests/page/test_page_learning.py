@@ -119,6 +119,34 @@ def test_update_is_that_of_the_package(case: str, pages: dict[str, str], player:
     assert not np.allclose(weights, before, rtol=0, atol=1e-3)
 
 
+@pytest.mark.parametrize("name", ["adam", "adamw"])
+def test_optimizer_is_that_of_keras_after_any_gradients(name: str, user: Player) -> None:
+    changes = {"weight_decay": 0.05} if name == "adamw" else {}
+    config = HEALTHY.change(
+        optimizer=name, learning_rate=0.5, gradient_clip=3.0, average_updates=9, **changes
+    )
+    random = np.random.RandomState(0)
+    sizes = np.array([5, 1, 0.1, 0.01])  # the gradients shrink, so that AMSGrad's maximum counts
+    gradients = (sizes[:, np.newaxis] * random.normal(size=(4, 6))).astype(np.float32)
+    optimizer: Any = make_optimizer(config)
+    weights = keras.Variable(np.linspace(-1, 1, 6, dtype=np.float32))
+    optimizer.build([weights])
+    for gradient in gradients:
+        optimizer.apply_gradients([(tf.constant(gradient), weights)])
+    found, average = user.run(
+        "const [settings, gradients] = arguments;"
+        "const weights = Float64Array.from({length: 6}, (_, i) => 0.4 * i - 1);"
+        "const optimizer = new Optimizer(settings, 6);"
+        "for (const each of gradients) optimizer.apply(weights, each);"
+        "return [Array.from(weights), Array.from(optimizer.average)]",
+        vars(config),
+        gradients.tolist(),
+    )
+    np.testing.assert_allclose(found, weights.numpy(), rtol=0, atol=1e-4)
+    (expected,) = optimizer._model_variables_moving_average
+    np.testing.assert_allclose(average, expected.numpy(), rtol=0, atol=1e-4)
+
+
 def test_schedules_are_those_of_the_package(user: Player) -> None:
     cosine = HEALTHY.change(learning_rate_min=1e-4)
     optimizer: Any = make_optimizer(cosine)

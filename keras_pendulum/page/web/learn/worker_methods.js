@@ -2,6 +2,8 @@
 
 const SOLVED = 1e-4; // a change of a sweep, as a share of the largest value, that ends the solution
 
+const MEASURED = 200; // updates
+
 /** What a worker does for the page: it trains one network, or iterates values. */
 class WorkerMethods {
   /**
@@ -41,6 +43,24 @@ class WorkerMethods {
     };
   }
 
+  /** Measures updates; returns their seconds, and how many numbers an observation has. */
+  measure({ recorded, settings }) {
+    const rows = settings.batch_size;
+    const trainer = new Trainer(new Task(recorded), settings, recorded.learning.action_count);
+    const [inputs] = trainer.network.sizes;
+    for (let i = 0; i < rows; i++) {
+      const observation = new Float32Array(inputs).fill(i / rows);
+      trainer.replay.add(observation, 0, -1, observation, 0);
+    }
+    const batch = trainer.replay.sample(new Random(0));
+    let started = 0;
+    for (let i = 0; i < MEASURED; i++) {
+      if (i === MEASURED / 2) started = performance.now(); // compiled by then
+      trainer.learner.update(batch);
+    }
+    return { secondsPerUpdate: (performance.now() - started) / 1000 / (MEASURED / 2), inputs };
+  }
+
   /** Starts value iteration from 0; `efforts` are those of the network. */
   startSweeps({ recorded, discount }) {
     const task = new Task(recorded);
@@ -49,7 +69,7 @@ class WorkerMethods {
     return null;
   }
 
-  /** Makes some sweeps, all that the solution needs by default; returns the values. */
+  /** Makes some sweeps, all that the solution needs by default; returns the values and their map. */
   sweep({ count = Infinity }) {
     const { iteration } = this;
     const started = iteration.sweeps;
@@ -59,7 +79,8 @@ class WorkerMethods {
       const largest = iteration.table.values.reduce((most, each) => Math.max(most, Math.abs(each)), 0);
       isSolved = change <= SOLVED * (1 - iteration.discount) * largest;
     }
-    return { values: iteration.table.values, sweeps: iteration.sweeps, isSolved };
+    const { table, efforts, discount, sweeps } = iteration;
+    return { values: table.values, map: sweptMap(table, efforts, discount), sweeps, isSolved };
   }
 }
 
