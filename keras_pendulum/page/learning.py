@@ -58,7 +58,7 @@ SWITCHES = {
     "truncated-index": Switch(
         "Truncated indices",
         "An index that is computed back from the torque is cut off, not rounded: two torques are "
-        "never learned, and their random values may win.",
+        "never learned, and their random values look better than all learned ones.",
         {"stored_index": "truncated"},
     ),
     "short-sight": Switch(
@@ -73,7 +73,7 @@ SWITCHES = {
     ),
     "reward-sign": Switch(
         "Reward with the wrong sign",
-        "A cost is given as a reward, so the agent learns the worst behaviour.",
+        "What is bad earns most, so the agent learns the worst behaviour.",
         own={"reward_factor": -1.0},
     ),
     "reward-scale": Switch(
@@ -83,12 +83,12 @@ SWITCHES = {
     ),
     "no-exploration": Switch(
         "ε = 0",
-        "The agent never tries an action at random, and sees only what it already prefers.",
+        "The agent never tries an action at random: random starts and early errors explore for it.",
         {"epsilon_start": 0.0, "epsilon_min": 0.0},
     ),
     "only-exploration": Switch(
         "ε = 1",
-        "Every action is random, so the agent never meets what its own policy leads to.",
+        "Every action is random, so the agent seldom sees where its own policy leads.",
         {"epsilon_start": 1.0, "epsilon_min": 1.0},
     ),
     "no-bootstrapping": Switch(

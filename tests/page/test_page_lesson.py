@@ -170,6 +170,21 @@ def test_healthy_and_faulty_run_start_alike_and_stay_side_by_side(
     assert readings == f"{len(other)}/500"
 
 
+def test_switch_starts_both_runs_anew_while_they_learn(
+    pages: dict[str, str], player: Player
+) -> None:
+    open_lesson(player, pages["one"])
+    player.find("train").click()
+    wait_for(lambda: len(records(player)[0]) >= 5)
+    for name in ("no-target", "one-update"):
+        player.driver.find_element(By.CSS_SELECTOR, f'#faults [value="{name}"]').click()
+        player.find("another-seed").click()
+    wait_for(lambda: [len(each) >= 5 for each in records(player)] == [True, True])
+    assert player.run("return pendulum.lesson.runs.map(r => r.settings.seed)") == [5, 5]
+    player.find("train").click()
+    wait_for(lambda: player.text("learning-status") == "Paused.")
+
+
 def test_screen_readers_are_told_only_the_changes_of_state(
     pages: dict[str, str], player: Player
 ) -> None:

@@ -148,12 +148,11 @@ class Lesson {
   backup(run, state) {
     const { last, settings, sizes } = run;
     if (!last) return null;
-    run.network ??= { of: null };
-    if (run.network.of !== last) {
+    if (run.networkOf !== last) {
       const recorded = { sizes, activation: settings.activation };
-      run.network = { of: last, network: new Network(recorded, last.weights, this.task) };
+      Object.assign(run, { network: new Network(recorded, last.weights, this.task), networkOf: last });
     }
-    return new Backup(state, run.network.network, settings, this.exact?.table, this.discount);
+    return new Backup(state, run.network, settings, this.exact?.table, this.discount);
   }
 }
 

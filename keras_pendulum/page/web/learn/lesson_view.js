@@ -17,13 +17,21 @@ class LessonView {
     this.colours = readColours(this.task.maxEffort);
   }
 
-  draw() {
+  /** Returns the parts of the drawing, which may be done in several frames. */
+  parts() {
     const { lesson } = this;
     if (this.chosen >= lesson.runs.length) this.chosen = 0;
-    this.#drawCurves();
-    this.#writeReadings();
-    this.#drawMaps();
-    this.#drawBackup();
+    const layers = new Layers(this.task, this.colours, lesson.exact);
+    const maps = [lesson.runs[0].last, lesson.runs[1]?.last, lesson.swept];
+    const backup = lesson.backup(lesson.runs[this.chosen], this.state);
+    return [
+      () => this.#writeReadings(),
+      ...maps.map((map, i) => () => this.#drawMap(layers, map, i, backup)),
+      () => this.#writeScale(layers, maps.find(Boolean)),
+      () => this.#drawBackup(backup),
+      () => this.#drawReturns(),
+      () => this.#drawRegrets(),
+    ];
   }
 
   /** The state of the chosen cell; numbers before θ, such as the position of the cart, are 0. */
@@ -32,24 +40,34 @@ class LessonView {
     return [...others, ...cellState(this.task, LEARNED_MAP_SIZE, ...this.cell)];
   }
 
-  #drawCurves() {
+  #drawReturns() {
     const { lesson, colours, task } = this;
-    const end = lesson.runs[0].settings.episodes;
-    const styles = [{ colour: colours.accent }, { colour: colours.plus, dashed: true }];
     const ofStep = task.curveName.endsWith("step");
-    const returns = lesson.runs.map(({ records }, i) => {
+    const series = this.#series(({ records }) => {
       const values = records.map((each) => each.episodeReturn / (ofStep ? each.steps : 1));
-      const points = trailingMeans(values).map((value, k) => [k + 1, value]);
-      return { ...styles[i], points };
+      return trailingMeans(values).map((value, k) => [k + 1, value]);
     });
     const title = `${task.curveName}, mean of ${AVERAGED_EPISODES} episodes`;
-    drawCurves(element("learning-curve"), colours, returns, returnAxis(returns, end, title));
-    const regrets = lesson.runs.map((run, i) => ({
-      ...styles[i],
-      points: run.regrets.map(({ episode, regret }) => [episode + 1, regret]),
+    const axis = returnAxis(series, lesson.runs[0].settings.episodes, title);
+    drawCurves(element("learning-curve"), colours, series, axis);
+  }
+
+  #drawRegrets() {
+    const { lesson, colours } = this;
+    const series = this.#series(({ regrets }) => regrets.map(({ episode, regret }) => [episode + 1, regret]));
+    const title = "greedy regret: optimum − return";
+    const axis = regretAxis(series, lesson.runs[0].settings.episodes, title);
+    drawCurves(element("regret-curve"), colours, series, axis);
+  }
+
+  /** Returns a curve for each run. */
+  #series(pointsOf) {
+    const { accent, plus } = this.colours;
+    return this.lesson.runs.map((run, i) => ({
+      colour: i ? plus : accent,
+      dashed: i > 0,
+      points: pointsOf(run),
     }));
-    const axis = regretAxis(regrets, end, "greedy regret: optimum − return");
-    drawCurves(element("regret-curve"), colours, regrets, axis);
   }
 
   #writeReadings() {
@@ -73,22 +91,21 @@ class LessonView {
     });
   }
 
-  #drawMaps() {
-    const { lesson, layer, colours, task } = this;
-    const layers = new Layers(task, colours, lesson.exact);
-    const maps = [lesson.runs[0].last, lesson.runs[1]?.last, lesson.swept];
-    maps.forEach((map, i) => {
-      const canvas = element(`learned-map-${i}`);
-      if (!canvas.clientWidth) return;
-      const pictureOf = (width, height) => {
-        const picture = map && layers.picture(layer, map, width, height);
-        return picture ?? new OffscreenCanvas(width, height);
-      };
-      const path = i < 2 && map?.path;
-      drawPortrait(canvas, colours, task, pictureOf, path ? [path] : []);
-      if (i === this.chosen) this.#markCell(canvas);
-    });
-    const [lowest, highest] = layers.ends(layer, maps.find(Boolean));
+  #drawMap(layers, map, i, backup) {
+    const { layer, colours, task } = this;
+    const canvas = element(`learned-map-${i}`);
+    if (!canvas.clientWidth) return;
+    const pictureOf = (width, height) => {
+      const picture = map && layers.picture(layer, map, width, height);
+      return picture ?? new OffscreenCanvas(width, height);
+    };
+    drawPortrait(canvas, colours, task, pictureOf, map?.path ? [map.path] : []);
+    if (i === this.chosen) this.#markCell(canvas, backup);
+  }
+
+  #writeScale(layers, map) {
+    const { layer, lesson, task } = this;
+    const [lowest, highest] = layers.ends(layer, map);
     const isCount = layer === "visits";
     const text = (value) => (isCount ? `${Math.round(Math.expm1(value))}` : shown(value, 1, layer !== "value"));
     element("scale-low").textContent = text(lowest);
@@ -99,7 +116,7 @@ class LessonView {
     element("sweep").firstElementChild.textContent = lesson.isSweeping ? "Stop" : "Sweep from 0";
   }
 
-  #markCell(canvas) {
+  #markCell(canvas, backup) {
     const { colours, task } = this;
     const context = canvas.getContext("2d");
     const [left, right, top, bottom] = portraitEdges(canvas.clientWidth, canvas.clientHeight);
@@ -112,22 +129,21 @@ class LessonView {
       context.lineWidth = width;
       context.strokeRect(x - 7, y - 7, 14, 14);
     }
-    const backup = this.lesson.backup(this.lesson.runs[this.chosen], this.state);
     if (!backup) return;
     const [angle, speed] = task.largest;
-    for (const i of backup.steps.keys()) {
+    const { best, efforts } = backup;
+    for (const i of new Set([0, efforts.length - 1, best])) {
       const [theta, thetadot] = backup.steps[i].state.slice(-2);
       const px = left + ((theta / angle + 1) / 2) * (right - left);
       const py = top + ((1 - thetadot / speed) / 2) * (bottom - top);
-      context.strokeStyle = i === backup.best ? colours.path : `rgb(${colours.ofEffort(backup.efforts[i])})`;
+      context.strokeStyle = i === best ? colours.path : `rgb(${colours.ofEffort(efforts[i])})`;
       context.lineWidth = 1.5;
       line(context, [[x, y], [px, py]]);
     }
   }
 
-  #drawBackup() {
+  #drawBackup(backup) {
     const { lesson, colours, task } = this;
-    const backup = lesson.backup(lesson.runs[this.chosen], this.state);
     const whose = lesson.runs.length > 1 ? ["healthy: ", "with the fault: "][this.chosen] : "";
     element("backup-text").textContent = backup
       ? whose + backup.text(task)

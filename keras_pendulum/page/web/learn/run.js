@@ -26,6 +26,7 @@ class LearningRun {
     this.updatesPerSecond = 0;
     this.#worker = new LearningWorker();
     this.#started = this.#worker.call("start", { recorded: withoutNetworks(recorded), settings });
+    this.#started.catch(() => {}); // `advance` rejects, too
   }
 
   #worker;

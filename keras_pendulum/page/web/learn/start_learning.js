@@ -1,18 +1,27 @@
 "use strict";
 
+const FRAME_SHARE = 6; // ms of a frame for the drawing of a lesson
+
 /** Starts the part of the page that learns; its workers start when it is shown for the first time. */
 function startLearning(page) {
   const { recorded, task } = page;
   const { learning } = recorded;
-  let [lesson, view, controls, isDue] = [null, null, null, false];
-  const redraw = () => {
-    if (isDue || !view || element("learn").hidden) return;
-    isDue = true;
-    requestAnimationFrame(() => {
+  let [lesson, view, controls] = [null, null, null];
+  let [parts, isDue] = [[], false]; // still to be drawn; whether to draw anew afterwards
+  const draw = () => {
+    const end = performance.now() + FRAME_SHARE;
+    while (parts.length && performance.now() < end) parts.shift()();
+    if (!parts.length && isDue) {
       isDue = false;
-      view.draw();
       controls.update();
-    });
+      parts = view.parts();
+    }
+    if (parts.length) requestAnimationFrame(draw);
+  };
+  const redraw = () => {
+    if (!view || element("learn").hidden) return;
+    if (!parts.length && !isDue) requestAnimationFrame(draw);
+    isDue = true;
   };
   const open = () => {
     if (!lesson) {

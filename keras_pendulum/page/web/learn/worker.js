@@ -23,10 +23,7 @@ class LearningWorker {
       if (problem === undefined) resolve(result);
       else reject(new Error(problem));
     };
-    this.#worker.onerror = ({ message }) => {
-      for (const { reject } of this.#waiting.values()) reject(new Error(message));
-      this.#waiting.clear();
-    };
+    this.#worker.onerror = ({ message }) => this.#rejectAll(message);
   }
 
   /** Runs a method; returns a promise of its result. */
@@ -38,8 +35,14 @@ class LearningWorker {
     });
   }
 
+  /** Ends the worker; calls without an answer reject. */
   end() {
     this.#worker.terminate();
+    this.#rejectAll("the worker has ended");
+  }
+
+  #rejectAll(message) {
+    for (const { reject } of this.#waiting.values()) reject(new Error(message));
     this.#waiting.clear();
   }
 }
