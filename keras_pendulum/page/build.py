@@ -2,7 +2,8 @@
 
 The scripts and the texts of a task are in a folder of their own in `web/`.
 
-The weights are base64 of float32, so the page needs no server and no network connection.
+The weights are base85 of float32, so the page needs no server and no network connection. The comma
+replaces the character <, which a script cannot contain.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.q_policies import DQNPolicy
+from keras_pendulum.page.learning import learning_content
 from keras_pendulum.page.task_content import FOLDERS, optimum_content
 from keras_pendulum.storage.load_weights import recorded_return
 from keras_pendulum.storage.run_info import RunInfo
@@ -52,6 +54,7 @@ def build_page(
         "against": None,
         "training": training,
         "optimum": optimum_content(task),
+        "learning": learning_content(task),
     }
     if name is not None:
         content["name"] = name
@@ -76,7 +79,7 @@ def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
         "sizes": [network.observation_size, *network.hidden_units, network.action_count],
         "activation": network.activation,
         "rewardScale": info.reward_scale,
-        "weights": base64.b64encode(weights).decode(),
+        "weights": base64.b85encode(weights).decode().replace("<", ","),
     }
 
 
@@ -84,7 +87,8 @@ def _fill(content: dict[str, Any], folder: str) -> str:
     """Returns the page with its style sheet, its scripts, its texts and `content` inside."""
 
     def read(name: str) -> str:
-        return (_WEB / name).read_text(encoding="utf-8")
+        text = (_WEB / name).read_text(encoding="utf-8")
+        return re.sub(r"^ +", "", text, flags=re.MULTILINE)  # the indentation is 20 KB
 
     texts = {"folder": folder, **json.loads(read(f"{folder}/texts.json"))}
     page = re.sub(r"\{\{(.+?)\}\}", lambda m: texts[m[1]], read("page.html"))

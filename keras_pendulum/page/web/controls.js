@@ -69,7 +69,7 @@ class Controls {
 
   #key(event) {
     const { page } = this;
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (element("watch").hidden || event.ctrlKey || event.metaKey || event.altKey) return;
     const key = event.key.toLowerCase();
     const { id, localName } = event.target;
     const upOrDown = key === "arrowup" || key === "arrowdown";

@@ -66,9 +66,21 @@ function decodedBytes(text) {
   return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
 }
 
-/** Returns the numbers of a text in base64 of float32. */
+// The digits of base85 as Python writes them, with a comma in place of <.
+const BASE85 = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~";
+
+/** Returns the numbers of a text in base85 of float32: five characters each. */
 function decodedFloats(text) {
-  return new Float32Array(decodedBytes(text).buffer); // little-endian, like every machine with a browser
+  if (text.length % 5) throw new Error("its weights are cut off");
+  const digits = new Uint8Array(128);
+  [...BASE85].forEach((character, i) => (digits[character.charCodeAt(0)] = i));
+  const bytes = new DataView(new ArrayBuffer((text.length / 5) * 4));
+  for (let i = 0, place = 0; i < text.length; place += 4) {
+    let number = 0;
+    for (const end = i + 5; i < end; i++) number = number * 85 + digits[text.charCodeAt(i)];
+    bytes.setUint32(place, number);
+  }
+  return new Float32Array(bytes.buffer); // little-endian, like every machine with a browser
 }
 
 /** Returns the numbers of a text in base64 of float16, which not every browser has an array for. */

@@ -41,6 +41,7 @@ class Page {
   frame(now, before) {
     const { stepTime } = this;
     requestAnimationFrame((later) => this.frame(later, now));
+    if (element("watch").hidden) return;
     const seconds = (now - before) / 1000;
     this.training?.advance(seconds);
     if (this.running && !this.held) {

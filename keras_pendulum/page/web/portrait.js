@@ -100,8 +100,10 @@ function drawPortrait(canvas, colours, task, pictureOf, paths) {
   }
 
   context.fillStyle = colours.soft;
-  for (const [theta, label] of task.angleTicks) write(context, label, x(theta), bottom + 13);
-  write(context, "angle θ (rad), 0 upright", (left + right) / 2, bottom + 31);
+  const narrow = width < 240; // px
+  const angles = task.angleTicks.filter((_, i) => !narrow || i % 2 === 0);
+  for (const [theta, label] of angles) write(context, label, x(theta), bottom + 13);
+  write(context, narrow ? "angle θ (rad)" : "angle θ (rad), 0 upright", (left + right) / 2, bottom + 31);
   for (const value of task.speedTicks) {
     const inside = clipped(y(value) - (top + bottom) / 2, (bottom - top) / 2 - 4);
     write(context, shown(value, Number.isInteger(value) ? 0 : 1), left - 6, inside + (top + bottom) / 2, "right");

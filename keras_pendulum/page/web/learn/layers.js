@@ -1,0 +1,67 @@
+"use strict";
+
+const ERROR_SHARE = 0.25; // of the range of the exact values: the end of the scale of errors
+
+/** The layers of the learned maps: their numbers, their colours and the ends of their scales. */
+class Layers {
+  /**
+   * @param {Task} task
+   * @param {object} colours see `readColours`.
+   * @param {?{values: Float32Array}} exact the map of the exact values; null where it is not known.
+   */
+  constructor(task, colours, exact) {
+    Object.assign(this, { task, colours, exact });
+    const numbers = exact ? Array.from(exact.values) : [];
+    this.range = numbers.length ? [Math.min(...numbers), Math.max(...numbers)] : null;
+  }
+
+  /** Returns the picture of a layer of a map, `width` x `height` pixels; null where it has none. */
+  picture(layer, map, width, height) {
+    if (layer === "effort") {
+      return mapPicture({ size: LEARNED_MAP_SIZE, efforts: map.efforts }, this.colours, width, height);
+    }
+    const numbers = this.#numbers(layer, map);
+    if (!numbers) return null;
+    const [lowest, highest] = this.ends(layer, map);
+    const share = (value) => clippedShare((value - lowest) / (highest - lowest || 1));
+    const colourOf = (value) => [...this.#colour(layer, share(value)), 255];
+    const picture = new OffscreenCanvas(width, height);
+    const context = picture.getContext("2d");
+    context.imageSmoothingEnabled = false;
+    const [cellX, cellY] = [width / (LEARNED_MAP_SIZE - 1), height / (LEARNED_MAP_SIZE - 1)];
+    const small = cells({ size: LEARNED_MAP_SIZE, efforts: numbers }, colourOf);
+    context.drawImage(small, -cellX / 2, -cellY / 2, width + cellX, height + cellY);
+    return picture;
+  }
+
+  /** Returns the lowest and the highest number of the scale. */
+  ends(layer, map) {
+    if (layer === "effort") return [-this.task.maxEffort, this.task.maxEffort];
+    if (layer === "error") {
+      const largest = ERROR_SHARE * (this.range[1] - this.range[0]);
+      return [-largest, largest];
+    }
+    if (layer === "visits") return [0, Math.log1p(map?.visits ? map.visits.reduce((a, b) => Math.max(a, b), 0) : 1)];
+    if (this.range) return this.range;
+    return map ? [map.values.reduce((a, b) => Math.min(a, b)), map.values.reduce((a, b) => Math.max(a, b))] : [0, 1];
+  }
+
+  #numbers(layer, { values, visits }) {
+    if (layer === "value") return values;
+    if (layer === "visits") return visits && visits.map(Math.log1p);
+    return this.exact && values.map((value, i) => value - this.exact.values[i]);
+  }
+
+  #colour(layer, share) {
+    const { minus, none, plus, accent, ink } = this.colours;
+    if (layer === "error") return share < 0.5 ? mixed(minus, none, 2 * share) : mixed(none, plus, 2 * share - 1);
+    return mixed(none, layer === "visits" ? ink : accent, share);
+  }
+}
+
+/** Returns red, green and blue between two colours #rrggbb. */
+function mixed(from, to, share) {
+  const channels = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
+  const [first, second] = [channels(from), channels(to)];
+  return first.map((channel, i) => Math.round(channel + share * (second[i] - channel)));
+}

@@ -1,0 +1,79 @@
+"use strict";
+
+const FRAME_SHARE = 6; // ms of a frame for the drawing of a lesson
+
+/** Starts the part of the page that learns; its workers start when it is shown for the first time. */
+function startLearning(page) {
+  const { recorded, task } = page;
+  const { learning } = recorded;
+  let [lesson, view, controls] = [null, null, null];
+  let [parts, isDue] = [[], false]; // still to be drawn; whether to draw anew afterwards
+  const draw = () => {
+    const end = performance.now() + FRAME_SHARE;
+    while (parts.length && performance.now() < end) parts.shift()();
+    if (!parts.length && isDue) {
+      isDue = false;
+      controls.update();
+      parts = view.parts();
+    }
+    if (parts.length) requestAnimationFrame(draw);
+  };
+  const redraw = () => {
+    if (!view || element("learn").hidden) return;
+    if (!parts.length && !isDue) requestAnimationFrame(draw);
+    isDue = true;
+  };
+  const open = () => {
+    if (!lesson) {
+      lesson = new Lesson(recorded, task, readAddress(location.hash, learning), redraw);
+      view = new LessonView(lesson, task);
+      controls = new LessonControls(lesson, view, redraw);
+      element("exact-figure").hidden = !lesson.hasExact;
+      document.querySelector('[data-learned-layer="error"]').hidden = !lesson.hasExact;
+      const sizes = new ResizeObserver(redraw);
+      document.querySelectorAll("#learn canvas").forEach((canvas) => sizes.observe(canvas));
+      measureTimes(recorded, controls);
+      lesson.solve().catch(({ message }) => {
+        lesson.problem = `This browser cannot train: ${message}.`;
+        redraw();
+      });
+    }
+    redraw();
+  };
+  const tabs = new Tabs((name) => {
+    if (name === "learn") open();
+    else {
+      lesson?.run(false);
+      page.redraw();
+    }
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    view?.recolour();
+    redraw();
+  });
+  addEventListener("hashchange", () => {
+    const choices = readAddress(location.hash, learning);
+    if (!choices.isLesson) return;
+    if (lesson) lesson.choose(choices);
+    tabs.show("learn");
+  });
+  if (readAddress(location.hash, learning).isLesson) tabs.show("learn");
+  window.pendulum.train = (settings = {}) => trainInPage(recorded, settings);
+  Object.defineProperty(window.pendulum, "lesson", { get: () => lesson });
+}
+
+/** Measures some updates of the default network, and shows the time of a run with each size. */
+async function measureTimes(recorded, controls) {
+  const worker = new LearningWorker();
+  const { settings, action_count: actions } = recorded.learning;
+  const argument = { recorded: withoutNetworks(recorded), settings };
+  const { secondsPerUpdate, inputs } = await worker.call("measure", argument);
+  worker.end();
+  const products = (units) =>
+    [...units, actions].reduce((sum, each, i) => sum + each * [inputs, ...units][i], 0);
+  const updates = totalUpdates(settings);
+  const unit = (updates * secondsPerUpdate) / products(settings.hidden_units);
+  controls.showTimes((units) => unit * products(units));
+}
+
+if (window.pendulum) startLearning(window.pendulum.page);
