@@ -31,6 +31,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     weights = parser.add_argument(
         "weights",
         metavar="WEIGHTS.h5|RUN_FOLDER",
+        nargs="?",
         help="a file, the name of a shipped one, or the folder of a run",
     )
     against = parser.add_argument(
@@ -42,7 +43,12 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "--out",
         type=nonempty_path,
         metavar="FILE",
-        help="file of the page [pendulum.html, or cartpole.html]",
+        help="file of the page [pendulum.html, cartpole.html or lesson.html]",
+    )
+    parser.add_argument(
+        "--lesson",
+        action="store_true",
+        help="write a lesson in five scenes on `reference` and `original`",
     )
     parser.add_argument(
         "--gravity",
@@ -55,6 +61,16 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     complete_with(weights, weights_files(shipped_names))
     complete_with(against, weights_files(shipped_names))
     arguments = parser.parse_args(argv)
+    if arguments.lesson:
+        given = [arguments.weights, arguments.against, arguments.gravity, arguments.activation]
+        if any(each is not None for each in given):
+            parser.error(
+                "--lesson shows `reference` and `original`: it takes only --out and --open"
+            )
+        arguments.weights, arguments.against = "reference", "original"
+        arguments.out = arguments.out or "lesson.html"
+    elif arguments.weights is None:
+        parser.error("the following arguments are required: WEIGHTS.h5|RUN_FOLDER")
     return run_command(lambda: _write(arguments))
 
 
@@ -87,7 +103,7 @@ def _write(arguments: argparse.Namespace) -> int:
     if assumption and arguments.gravity is None:
         print(assumption)
     with status("Computing the optimum for the page"):
-        page = build_page(network, path, task, against, training, name)
+        page = build_page(network, path, task, against, training, name, arguments.lesson)
     write_atomically(out, page)
     address = out.resolve().as_uri()
     print(f"Wrote {len(page) / 1e6:.2f} MB; open it in a browser: {address}")

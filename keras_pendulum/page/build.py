@@ -35,6 +35,7 @@ def build_page(
     against: tuple[DQN, Path] | None = None,
     training: dict[str, Any] | None = None,
     name: str | None = None,
+    lesson: bool = False,
 ) -> bytes:
     """Returns the HTML file.
 
@@ -46,6 +47,7 @@ def build_page(
             its file.
         training: the `training_content` of the network's run.
         name: the name of the network on the page; None takes that of the file.
+        lesson: whether the page is that of the lesson, whose text is about the pendulum.
 
     Raises ConfigError for networks of two environments.
     """
@@ -63,7 +65,7 @@ def build_page(
         if other != task.environment:
             raise ConfigError(f"{against[1]}: belongs to {other}; {path} to {task.environment}")
         content["against"] = _network_content(*against, task)
-    return _fill(content, FOLDERS[task.environment]).encode()
+    return _fill(content, FOLDERS[task.environment], lesson).encode()
 
 
 def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
@@ -83,7 +85,7 @@ def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
     }
 
 
-def _fill(content: dict[str, Any], folder: str) -> str:
+def _fill(content: dict[str, Any], folder: str, lesson: bool) -> str:
     """Returns the page with its style sheet, its scripts, its texts and `content` inside."""
 
     def read(name: str) -> str:
@@ -91,6 +93,8 @@ def _fill(content: dict[str, Any], folder: str) -> str:
         return re.sub(r"^ +", "", text, flags=re.MULTILINE)  # the indentation is 20 KB
 
     texts = {"folder": folder, **json.loads(read(f"{folder}/texts.json"))}
+    texts["scenes"] = read("scenes/scenes.html") if lesson else ""
+    texts["last script"] = '<script src="scenes/scenes.js"></script>' if lesson else ""
     page = re.sub(r"\{\{(.+?)\}\}", lambda m: texts[m[1]], read("page.html"))
     page = re.sub(
         r'<link rel="stylesheet" href="(.+)">', lambda m: f"<style>\n{read(m[1])}</style>", page
