@@ -52,6 +52,7 @@ COMMANDS = (
     Command("learning.last_regret", 4, ("reference",), ("last_regret_reference",), ("scipy",)),
     Command("learning.last_regret", 11, ("swingup", "4"), ("last_regret_swingup",), ("scipy",)),
     Command("learning.finer_torques", 5, results=("finer_torques",)),
+    Command("learning.training_curves", 3, results=("training_curves",)),
     Command(
         "learning.reference_beside_libraries",
         15,

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.learning.departures import BEFORE
-from benchmarks.pages import code_blocks, preset_blocks, study_blocks
+from benchmarks.pages import code_blocks, paper_blocks, preset_blocks, study_blocks
 from benchmarks.result_files import ROOT, markdown, rows_of
 
 BLOCKS: dict[str, Callable[[], str]] = {
@@ -21,6 +21,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "quality": preset_blocks.quality,
     **{f"departures of {name}": partial(preset_blocks.departure_table, name) for name in BEFORE},
     "choosing": preset_blocks.choosing,
+    "Mnih et al. 2015": paper_blocks.mnih_table,
     "steps": study_blocks.steps,
     "study": study_blocks.study_table,
     "exercise 1": study_blocks.exercise_updates,
@@ -37,6 +38,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "falls of CartPole": lambda: markdown(rows_of("cartpole_falls")),
     "speed of CartPole": code_blocks.cartpole_speed,
     "speeds": code_blocks.speeds,
+    "training curves": lambda: markdown(rows_of("training_curves")),
     "finer torques": code_blocks.finer_torques,
     "tests of the files": code_blocks.file_tests,
     "files of the DQN": code_blocks.dqn_files,
