@@ -245,9 +245,9 @@ def test_backup_of_a_cell_is_the_equation(pages: dict[str, str], player: Player)
     step(player, 1)
     player.find("learned-map-1").send_keys(Keys.ARROW_RIGHT, Keys.ARROW_UP)
     wait_for(
-        lambda: player.text("backup-text").startswith("with the fault: θ = 0.39 rad, θ̇ = 1.00")
+        lambda: player.text("backup-text").startswith("with the fault: θ = −0.39 rad, θ̇ = 1.00")
     )
-    state = [3 * np.pi / 24, 1.0]
+    state = [-3 * np.pi / 24, 1.0]  # to the right of upright
     script = (
         "const {qValues, targets, exact, best} ="
         " pendulum.lesson.backup(pendulum.lesson.runs[arguments[0]], arguments[1]);"
@@ -282,7 +282,7 @@ def test_maps_show_the_network_and_where_it_was(pages: dict[str, str], player: P
     )
     assert sum(visits) == CONFIG.max_episode_steps == len(path) - 1
     cells = {
-        (round((1 - speed / 8) * 24), round((((theta + np.pi) % (2 * np.pi)) / np.pi) * 24))
+        (round((1 - speed / 8) * 24), round((((np.pi - theta) % (2 * np.pi)) / np.pi) * 24))
         for theta, speed in path[:-1]
     }
     seen = {divmod(i, 49) for i, count in enumerate(visits) if count}
@@ -296,6 +296,23 @@ def test_maps_show_the_network_and_where_it_was(pages: dict[str, str], player: P
     for layer in ("value", "error", "visits", "effort"):
         player.driver.find_element(By.CSS_SELECTOR, f'[data-learned-layer="{layer}"]').click()
         wait_for(lambda: player.find("learned-scale").get_attribute("data-scale") == layer)  # noqa: B023
+
+
+def test_cartpole_learns_in_the_page(pages: dict[str, str], player: Player) -> None:
+    player.open(f"{pages['cartpole']}#fault=no-target&network=8")
+    wait_for(lambda: player.run("return Boolean(pendulum.lesson)"))
+    step(player, 2)
+    assert not player.find("exact-figure").is_displayed()  # values on four axes take too long
+    assert not player.driver.find_elements(By.CSS_SELECTOR, '#faults [value="truncated-index"]')
+    one, other = records(player)
+    assert one[0]["steps"] == one[0]["episodeReturn"] == other[0]["episodeReturn"] < 500
+    assert len(player.run("return pendulum.lesson.runs[0].last.path[0]")) == 4
+    player.find("learned-map-0").send_keys(Keys.ARROW_RIGHT)
+    wait_for(lambda: player.text("backup-text").startswith("healthy: θ = −0.08 rad"))
+    short = {"episodes": 8, "warmup_episodes": 4, "hidden_units": [8]}
+    result = train(player, **short)
+    assert result["updates"] > 0
+    assert 0 < result["regret"] < 500
 
 
 def test_lesson_fits_every_screen(pages: dict[str, str], player: Player) -> None:

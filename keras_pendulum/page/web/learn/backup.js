@@ -46,7 +46,7 @@ function drawFan(canvas, colours, task, { state, steps, efforts, best }) {
   const reach = [0, 1].map((i) => Math.max(1e-6, ...moves.map((move) => Math.abs(move[i]))));
   const [middle, level] = [width / 2, height / 2];
   const place = ([angle, speed]) => [
-    middle + (angle / reach[0]) * (width / 2 - 30),
+    middle + ((task.rightward * angle) / reach[0]) * (width / 2 - 30),
     level - (speed / reach[1]) * (height / 2 - 26),
   ];
   context.strokeStyle = colours.line;

@@ -2,10 +2,13 @@
 
 const LEARNED_MAP_SIZE = 49; // cells of θ and of θ̇, the ends included
 
-/** Returns the θ and θ̇ of a cell of a map with `size` rows and columns, of which row 0 is the highest. */
+/**
+ * Returns the θ and θ̇ of a cell of a map with `size` rows and columns. Row 0 is the highest, and what
+ * leans to the right is on the right.
+ */
 function cellState(task, size, row, column) {
   const [angle, speed] = task.largest;
-  return [((2 * column) / (size - 1) - 1) * angle, (1 - (2 * row) / (size - 1)) * speed];
+  return [((2 * column) / (size - 1) - 1) * task.rightward * angle, (1 - (2 * row) / (size - 1)) * speed];
 }
 
 /** Returns the row and the column of the cell of a state, within the map. */
@@ -13,7 +16,7 @@ function stateCell(task, size, state) {
   const [theta, thetadot] = state.slice(-2);
   const [angle, speed] = task.largest;
   const place = (share) => Math.round(((clipped(share, 1) + 1) / 2) * (size - 1));
-  return [place(-thetadot / speed), place(task.angle(theta) / angle)];
+  return [place(-thetadot / speed), place((task.rightward * task.angle(theta)) / angle)];
 }
 
 /** How often each cell of the map was visited in training. */

@@ -134,7 +134,7 @@ class LessonView {
     const { best, efforts } = backup;
     for (const i of new Set([0, efforts.length - 1, best])) {
       const [theta, thetadot] = backup.steps[i].state.slice(-2);
-      const px = left + ((theta / angle + 1) / 2) * (right - left);
+      const px = left + (((task.rightward * theta) / angle + 1) / 2) * (right - left);
       const py = top + ((1 - thetadot / speed) / 2) * (bottom - top);
       context.strokeStyle = i === best ? colours.path : `rgb(${colours.ofEffort(efforts[i])})`;
       context.lineWidth = 1.5;
