@@ -152,3 +152,26 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
     keys = ActionChains(player.driver, duration=0)
     keys.key_down(Keys.CONTROL).send_keys("j").key_up(Keys.CONTROL).perform()
     assert player.button(2).get_attribute("aria-pressed") == "true"  # the browser's own shortcut
+
+
+def test_score_of_the_last_episode_does_not_stay_beside_another_one(user: Player) -> None:
+    first = user.text("score")
+    for act in ("r", "h"):
+        user.run("while (!pendulum.page.over) pendulum.step()")
+        assert user.text("score").startswith("Score: network ")
+        user.press(act)
+        assert user.text("score") == first
+
+
+def test_numbers_that_change_all_the_time_are_no_live_regions(user: Player) -> None:
+    live = user.run(
+        "return [...document.querySelectorAll("
+        "'output, [aria-live]:not([aria-live=off]), [role=status], [role=alert]')].map(e => e.id)"
+    )
+    texts = "return arguments[0].map(id => document.getElementById(id).textContent)"
+    user.run("pendulum.reset(3, 0)")
+    before = user.run(texts, live)
+    user.run("for (let i = 0; i < 50; i++) pendulum.step()")
+    user.redraw()
+    assert live
+    assert user.run(texts, live) == before

@@ -47,7 +47,7 @@ class Controls {
     click(element("take-over"), () => page.drive(!page.episode.youDrive));
     click(element("pause"), () => page.pause());
     click(element("one-step"), () => page.oneStep());
-    click(element("restart"), () => page.restart());
+    click(element("restart"), () => page.restartAnew());
     click(element("play-training"), () => page.playTraining());
     for (const button of document.querySelectorAll("[data-direction]")) {
       const act = () => page.choose(Number(button.dataset.direction));
@@ -85,8 +85,8 @@ class Controls {
     else if (key === " ") page.pause();
     else if (key === "s") page.oneStep();
     else if (key === "m") page.showLayer(page.nextLayer());
-    else if (key === "h" && page.task.hanging) page.restart(...page.task.hanging);
-    else if (key === "r") page.restart();
+    else if (key === "h" && page.task.hanging) page.restartAnew(...page.task.hanging);
+    else if (key === "r") page.restartAnew();
     else if (key === "t") page.drive(!page.episode.youDrive);
     else if (key === "p") page.playTraining();
     else return;

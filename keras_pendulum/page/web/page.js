@@ -25,6 +25,7 @@ class Page {
     this.held = false; // whether a pointer or a key holds the system
     this.heldByKey = false;
     this.names = networkNames(recorded);
+    this.firstScore = element("score").textContent;
     this.showNames();
     this.restart();
     this.running = !calm.matches;
@@ -91,13 +92,19 @@ class Page {
     this.changed = true;
   }
 
+  /** Starts an episode that the user asks for: the last score is no longer of interest. */
+  restartAnew(...state) {
+    element("score").textContent = this.firstScore;
+    this.restart(...state);
+  }
+
   /** Shows another network in place of the first one, from the same start. */
   replaceNetwork(network, map) {
     this.episode.network = network;
     this.maps[0] = map;
     this.changeMap();
     const { optimalReturn } = this;
-    this.restart(...this.start);
+    this.restartAnew(...this.start);
     this.optimalReturn = optimalReturn;
   }
 
@@ -193,7 +200,7 @@ class Page {
   put(state, released, byKey = false) {
     this.held = !released;
     this.heldByKey = this.held && byKey;
-    this.restart(...state);
+    this.restartAnew(...state);
     this.controls.update();
   }
 
