@@ -22,7 +22,7 @@ PENDULUM = ENVIRONMENT == "Pendulum-v1"
 ACTIONS = np.linspace(-2, 2, 11) if PENDULUM else np.arange(2)  # [2] N·m, or left and right
 SIZES = (1, 1, 8) if PENDULUM else (2.4, 2, 0.2, 2)  # [3] of the numbers of an observation
 REWARD_SCALE = 0.02  # [4]
-DISCOUNT = 0.985 if PENDULUM else 0.99  # γ
+DISCOUNT = 0.985 if PENDULUM else 0.98  # γ
 STEPS = 40_000  # of the environment
 FIRST_UPDATE = 1_000  # step
 UPDATE_EVERY = 2  # steps
