@@ -143,9 +143,11 @@ def test_choices_are_written_into_the_address(pages: dict[str, str], player: Pla
     player.find("another-seed").click()
     assert player.run("return location.hash") == "#learn&fault=short-sight&seed=4&network=8"
     assert player.text("fault-text") == SWITCHES["short-sight"].sentence
-    player.run("location.hash = '#fault=far-sight'")
+    player.run("location.hash = '#fault=far-sight&network=9-9&speed=3'")
     wait_for(lambda: player.text("fault-text") == SWITCHES["far-sight"].sentence)
     assert player.run("return pendulum.lesson.runs[1].settings.discount") == 0.999
+    assert player.find("network-size").get_property("value") == "9-9"
+    assert player.find("speed").get_property("value") == "3"
 
 
 def test_healthy_and_faulty_run_start_alike_and_stay_side_by_side(

@@ -20,8 +20,8 @@ class LessonControls {
     element("choices").hidden = !hasControls;
     for (const box of document.querySelectorAll("#faults input")) box.checked = faults.includes(box.value);
     element("seed").value = seed;
-    element("speed").value = speed;
-    element("network-size").value = units.join("-");
+    choice(element("speed"), speed, `${speed} episodes a second`);
+    choice(element("network-size"), units.join("-"), units.join("-"));
     const started = lesson.episode > 0;
     element("train").firstElementChild.textContent = lesson.running ? "Pause" : started ? "Go on" : "Start";
     element("train").disabled = element("one-episode").disabled = lesson.isFinished || Boolean(lesson.problem);
@@ -58,16 +58,12 @@ class LessonControls {
       label.append(box, title);
       element("faults").append(label);
     }
-    const option = (value, text) => Object.assign(document.createElement("option"), { value, textContent: text });
     element("speed").append(
       option(0, "as fast as it can"),
       ...SPEEDS.map((each) => option(each, `${each} episode${each > 1 ? "s" : ""} a second`)),
     );
-    const { units } = this.lesson.choices;
-    const sizes = [settings.hidden_units, ...networks, units].map((each) => each.join("-"));
-    element("network-size").append(...[...new Set(sizes)].map((size) => option(size, size)));
-    const { speed } = this.lesson.choices;
-    if (speed && !SPEEDS.includes(speed)) element("speed").append(option(speed, `${speed} episodes a second`));
+    const sizes = [settings.hidden_units, ...networks].map((each) => each.join("-"));
+    element("network-size").append(...sizes.map((size) => option(size, size)));
   }
 
   /** Writes the time of a whole run behind each size, from the speed of one. */
@@ -149,4 +145,15 @@ class LessonControls {
       choose(row + step * move[0], column + step * move[1]);
     });
   }
+}
+
+function option(value, text) {
+  return Object.assign(document.createElement("option"), { value, textContent: text });
+}
+
+/** Chooses a value of a list, which gets it where the address names another one. */
+function choice(list, value, text) {
+  const values = [...list.options].map((each) => each.value);
+  if (!values.includes(String(value))) list.append(option(value, text));
+  list.value = value;
 }

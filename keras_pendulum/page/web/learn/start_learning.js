@@ -23,22 +23,27 @@ function startLearning(page) {
     if (!parts.length && !isDue) requestAnimationFrame(draw);
     isDue = true;
   };
+  const fail = ({ message }) => {
+    element("learning-status").textContent = `This browser cannot train: ${message}.`;
+  };
   const open = () => {
-    if (!lesson) {
-      lesson = new Lesson(recorded, task, readAddress(location.hash, learning), redraw);
-      view = new LessonView(lesson, task);
-      controls = new LessonControls(lesson, view, redraw);
-      element("exact-figure").hidden = !lesson.hasExact;
-      document.querySelector('[data-learned-layer="error"]').hidden = !lesson.hasExact;
-      const sizes = new ResizeObserver(redraw);
-      document.querySelectorAll("#learn canvas").forEach((canvas) => sizes.observe(canvas));
-      measureTimes(recorded, controls);
-      lesson.solve().catch(({ message }) => {
-        lesson.problem = `This browser cannot train: ${message}.`;
-        redraw();
-      });
+    try {
+      if (!lesson) create();
+      redraw();
+    } catch (error) {
+      fail(error);
     }
-    redraw();
+  };
+  const create = () => {
+    lesson = new Lesson(recorded, task, readAddress(location.hash, learning), redraw);
+    view = new LessonView(lesson, task);
+    controls = new LessonControls(lesson, view, redraw);
+    element("exact-figure").hidden = !lesson.hasExact;
+    document.querySelector('[data-learned-layer="error"]').hidden = !lesson.hasExact;
+    const sizes = new ResizeObserver(redraw);
+    document.querySelectorAll("#learn canvas").forEach((canvas) => sizes.observe(canvas));
+    measureTimes(recorded, controls).catch(fail);
+    lesson.solve().catch(fail);
   };
   const tabs = new Tabs((name) => {
     if (name === "learn") open();
