@@ -13,6 +13,7 @@ from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
 
 _RIGHT_ERROR = 0.03  # below, no other equation is of interest
+_GROWN = 3.0  # spreads above the best possible value
 _DIVERGED = 20.0  # spreads above the best possible value: no equation has this fixed point
 _HEALTHY = f"{RIGHT} to 1 to 7 %"
 
@@ -56,6 +57,26 @@ def wrong_equation(m: Measurement) -> Finding | None:
         evidence += _percent(right.error)
         text = Fault(equation.explanation, equation.remedy) if equation.explanation else None
         return Finding(equation.name, evidence, _HEALTHY, repair, equation.variant, text, proven)
+    return None
+
+
+def growth_beyond_ends(m: Measurement) -> Finding | None:
+    """Finds values that grew without bound, also where an episode ends.
+
+    Where ends are stored, the values of the last steps stay near their reward when others grow.
+    """
+    if m.task.never_terminates or not m.finite or m.excess < _GROWN:
+        return None
+    right = m.right_agreement
+    for own, equation in m.agreements:
+        beyond = equation.name == "missing-end" and own.at_ends > 0.9
+        if beyond and own.error < 0.6 * right.error:
+            evidence = (
+                f"values of {m.backup.q.mean():.2g}, and {_percent(own.at_ends)} of it in the last "
+                f"step of an episode; they satisfy {equation.formula} to {_percent(own.error)} and "
+                f"{RIGHT} to {_percent(right.error)}"
+            )
+            return Finding("missing-end", evidence, _HEALTHY)
     return None
 
 

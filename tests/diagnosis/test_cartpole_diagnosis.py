@@ -69,6 +69,8 @@ def first(values: Any, **options: Any) -> str:
         ("torque-map", lambda o: exact_values(o)[:, ::-1]),
         ("observation-map", lambda o: exact_values(o[:, [2, 3, 0, 1]])),
         ("missing-end", lambda o: 20 + 0.001 * np.sin(o[:, :2])),
+        ("missing-end", lambda o: 2e7 + 3e8 * o[:, [2, 2]] ** 2),
+        ("overestimation", lambda o: 2e7 * np.cos(6 * o[:, 2:3]) + 1e6 * o[:, :2]),
         ("no-bootstrapping", lambda o: 1 + 0.001 * np.sin(o[:, :2])),
         ("wrong-loss (batch-broadcast)", lambda o: 9 + 0.001 * np.sin(o[:, :2])),
         ("wrong-target (batch-max or same-state)", constant_values(18.0)),
