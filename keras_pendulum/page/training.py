@@ -10,6 +10,7 @@ snapshot's own, in float16.
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.figures.learning_curve import curve_values, trailing_mean
-from keras_pendulum.storage.recorded_run import load_recorded_run
+from keras_pendulum.figures.learning_curve import OPTIMUM, RANDOM, curve_values, trailing_mean
+from keras_pendulum.optimum.solutions import solution
+from keras_pendulum.storage.recorded_run import RecordedRun, load_recorded_run
 from keras_pendulum.storage.run_folder import RunFolder
 from keras_pendulum.storage.snapshots import read_snapshots
 
@@ -47,12 +49,30 @@ def training_content(folder: RunFolder, network: DQN) -> dict[str, Any] | None:
     before = [each for each in snapshots if each.episodes < len(history)]
     if not before:
         return None
+    task = recorded.config.task
     shapes = [array.shape for array in network.get_weights()]
     return {
         "episodes": [*(each.episodes for each in before), len(history)],
         "untrained": sum(record.updates == 0 for record in history),
-        "curve": _curve(curve_values(history, recorded.config.task)),
+        "curve": _curve(curve_values(history, task)),
+        "levels": _levels(recorded),
         "networks": [_encode(each.weights, shapes) for each in before],
+    }
+
+
+def _levels(run: RecordedRun) -> dict[str, float]:
+    """Returns the best possible return and that of random actions, as the curve shows returns.
+
+    They are left out for a pendulum beyond 200 steps, where they are not known.
+    """
+    exact, steps = solution(run.config.task), run.config.max_episode_steps
+    returns = {OPTIMUM: exact.mean_best_return(steps), RANDOM: exact.random_return(steps)}
+    if math.isnan(returns[OPTIMUM]):
+        return {}
+    mean_steps = run.history[-1].environment_steps / len(run.history)
+    return {
+        name: float(f"{run.config.task.curve_value(value, mean_steps):.4g}")
+        for name, value in returns.items()
     }
 
 

@@ -8,11 +8,12 @@ function curveValue(curve, share) {
   return curve[Math.round(share * (curve.length - 1))];
 }
 
-/** Draws the learning curve, and a cursor at the episode `here`. */
-function drawCurve(canvas, colours, curve, here, end) {
+/** Draws the learning curve, dashed lines at `levels`, and a cursor at the episode `here`. */
+function drawCurve(canvas, colours, { curve, levels }, here, end) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = [CURVE_AXIS + HALF_THUMB, width - HALF_THUMB, 5, height - 5];
-  const [lowest, highest] = [Math.min(...curve), Math.max(...curve)];
+  const all = [...curve, ...Object.values(levels)];
+  const [lowest, highest] = [Math.min(...all), Math.max(...all)];
   const x = (share) => left + share * (right - left);
   const y = (value) => bottom - ((value - lowest) / (highest - lowest || 1)) * (bottom - top);
 
@@ -24,6 +25,15 @@ function drawCurve(canvas, colours, curve, here, end) {
   context.strokeStyle = colours.line;
   context.lineWidth = 1;
   line(context, [[CURVE_AXIS, top], [CURVE_AXIS, bottom], [right, bottom]]);
+  context.setLineDash([3, 4]);
+  context.strokeStyle = colours.soft;
+  for (const [name, value] of Object.entries(levels)) {
+    line(context, [[CURVE_AXIS, y(value)], [right, y(value)]]);
+    // The name is on the side of the line that has more space.
+    const below = y(value) < (top + bottom) / 2;
+    write(context, name, right, y(value) + (below ? 8 : -8), "right");
+  }
+  context.setLineDash([]);
   context.strokeStyle = colours.accent;
   context.lineWidth = 2;
   line(context, curve.map((value, i) => [x(i / (curve.length - 1 || 1)), y(value)]));

@@ -10,13 +10,14 @@ class Training {
   /**
    * @param {object} recorded the content of the page. Its `training` has `episodes`, after which
    *   the networks were kept; `untrained`, the episodes before the first update; `curve`, the rewards of a step at even distances from the first to the
-   *   last episode; and `networks`, all but the last one.
+   *   last episode; `levels`, that of the best possible return and of random actions by name; and
+   *   `networks`, all but the last one.
    * @param {Network} last the network after the last of the episodes.
    * @param {Task} task
    */
   constructor(recorded, last, task) {
-    const { episodes, untrained, curve, networks } = recorded.training;
-    Object.assign(this, { recorded, episodes, untrained, curve, task });
+    const { episodes, untrained, curve, levels, networks } = recorded.training;
+    Object.assign(this, { recorded, episodes, untrained, curve, levels, task });
     if (networks.length !== episodes.length - 1) throw new Error("a network of its training is missing");
     this.shown = networks.length;
     this.playing = false;
@@ -78,7 +79,8 @@ class Training {
   drawIfChanged(colours) {
     if (!this.changed) return;
     this.changed = false;
-    drawCurve(element("curve"), colours, this.curve, this.episodes[this.shown], this.episodes.at(-1));
+    const [here, end] = [this.episodes[this.shown], this.episodes.at(-1)];
+    drawCurve(element("curve"), colours, this, here, end);
   }
 
   #showTexts() {
