@@ -21,8 +21,8 @@ class Network {
       kernel: taken(sizes[i] * units),
       bias: taken(units),
       activate: i === sizes.length - 2 ? (x) => x : (activations[i] ?? activations[0]),
-      sums: new Float64Array(units),
-      output: new Float32Array(units),
+      sums: new Float64Array(2 * units), // of two observations
+      output: new Float32Array(2 * units),
     }));
     this.efforts = task.efforts(sizes.at(-1));
   }
@@ -31,33 +31,36 @@ class Network {
 
   /** Returns the Q-values [A] of an observation; the next call overwrites the array. */
   qValues(observation) {
-    let features = observation;
-    for (const { kernel, bias, activate, sums, output } of this.layers) {
-      const units = sums.length;
-      sums.set(bias);
-      let i = 0;
-      // Four inputs at a time take half the time of single ones, because `sums` is accessed less often.
-      for (; i + 4 <= features.length; i += 4) {
-        const [a, b, c, d] = [features[i], features[i + 1], features[i + 2], features[i + 3]];
-        for (let j = 0, k = i * units; j < units; j++, k++) {
-          sums[j] +=
-            a * kernel[k] + b * kernel[k + units] + c * kernel[k + 2 * units] + d * kernel[k + 3 * units];
-        }
-      }
-      for (; i < features.length; i++) {
-        for (let j = 0, k = i * units; j < units; j++, k++) sums[j] += features[i] * kernel[k];
-      }
-      for (let j = 0; j < units; j++) {
-        output[j] = activate(Math.fround(sums[j]));
-      }
-      features = output;
-    }
-    return features;
+    return this.#pair(observation, observation).subarray(0, this.efforts.length);
   }
 
   /** Returns the greedy effort. */
   effort(state) {
-    return this.efforts[argmax(this.qValues(this.task.observed(state)))];
+    return this.effortsOf([state])[0];
+  }
+
+  /** Returns the greedy effort of each state, at most two of them. */
+  effortsOf(states) {
+    const [one, other] = states.map((state) => this.task.observed(state));
+    const values = this.#pair(one, other ?? one);
+    const { efforts } = this;
+    return states.map((_, i) => {
+      return efforts[argmax(values.subarray(i * efforts.length, (i + 1) * efforts.length))];
+    });
+  }
+
+  /** Returns the Q-values [2, A] of two observations: a state of two takes half the time of one alone. */
+  #pair(one, other) {
+    let [features, inputs] = [Float32Array.of(...one, ...other), one.length];
+    for (const { kernel, bias, activate, sums, output } of this.layers) {
+      const units = bias.length;
+      sums.set(bias);
+      sums.set(bias, units);
+      addProduct(sums, features, inputs, 1, kernel, 2, inputs, units);
+      for (let j = 0; j < 2 * units; j++) output[j] = activate(Math.fround(sums[j]));
+      [features, inputs] = [output, units];
+    }
+    return features;
   }
 }
 

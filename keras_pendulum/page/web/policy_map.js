@@ -3,7 +3,7 @@
 /** The effort of a policy over the phase plane, computed in small portions, coarse cells first. */
 class PolicyMap {
   constructor(policy, task) {
-    this.policy = policy; // its method `effort` returns one for a state
+    this.policy = policy; // its method `effort` returns one for a state, or `effortsOf` those of two
     this.task = task;
     this.size = task.mapSize; // columns of θ as the portrait has them, rows of θ̇ from above
     this.efforts = new Float32Array(this.size ** 2);
@@ -34,19 +34,27 @@ class PolicyMap {
     if (this.ready) return false;
     const end = performance.now() + milliseconds;
     do {
-      const { value, done } = this.#cells.next();
-      if (done) {
+      const cells = [this.#cells.next(), this.#cells.next()].filter(({ done }) => !done);
+      if (!cells.length) {
         this.ready = true;
         break;
       }
-      const [row, column, width] = value;
-      const effort = this.policy.effort([...this.others, this.theta(column), this.thetadot(row)]);
-      for (let i = row; i < Math.min(row + width, this.size); i++) {
-        const j = i * this.size + column;
-        this.efforts.fill(effort, j, Math.min(j + width, (i + 1) * this.size));
-      }
+      this.#compute(cells.map(({ value }) => value));
     } while (performance.now() < end);
     return true;
+  }
+
+  /** Writes the efforts of two cells: [row, column, width] each. */
+  #compute(cells) {
+    const { policy, others, size } = this;
+    const states = cells.map(([row, column]) => [...others, this.theta(column), this.thetadot(row)]);
+    const efforts = policy.effortsOf?.(states) ?? states.map((state) => policy.effort(state));
+    cells.forEach(([row, column, width], k) => {
+      for (let i = row; i < Math.min(row + width, size); i++) {
+        const j = i * size + column;
+        this.efforts.fill(efforts[k], j, Math.min(j + width, (i + 1) * size));
+      }
+    });
   }
 
   *#coarseToFine(coarsest) {
