@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import cache
 
 from keras_pendulum.diagnosis import comparisons, repairs
-from keras_pendulum.diagnosis.equations import RIGHT, Equation
+from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
 

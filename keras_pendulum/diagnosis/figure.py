@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from keras_pendulum.diagnosis.equations import RIGHT
+from keras_pendulum.diagnosis.equation import RIGHT
 from keras_pendulum.errors import one_line
 from keras_pendulum.figures.style import own_style, plain_text
 

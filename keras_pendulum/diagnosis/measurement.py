@@ -14,7 +14,8 @@ import numpy as np
 from keras_pendulum.config.config import Config
 from keras_pendulum.diagnosis import signals
 from keras_pendulum.diagnosis.backup import Agreement, Backup, Visited, agreement
-from keras_pendulum.diagnosis.equations import RIGHT, Equation, agreements
+from keras_pendulum.diagnosis.equation import RIGHT, Equation
+from keras_pendulum.diagnosis.equations import agreements
 from keras_pendulum.diagnosis.motion import Motion, motion_kind
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array, Fit

@@ -11,7 +11,7 @@ from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis.backup import Agreement
-from keras_pendulum.diagnosis.equations import Equation
+from keras_pendulum.diagnosis.equation import Equation
 
 LAST = len(TORQUES) - 1
 UNTRAINED = np.random.RandomState(3).normal(size=(3, 5)) * 0.1

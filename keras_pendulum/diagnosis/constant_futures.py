@@ -1,0 +1,128 @@
+"""The equations in which a constant takes the place of the next values.
+
+Q - r shows them: it is nothing, a constant, an index, or the values of a network that never learns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from keras_pendulum.diagnosis.backup import Backup
+from keras_pendulum.diagnosis.equation import Equation
+from keras_pendulum.diagnosis.signals import Array, line_fit
+from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
+
+
+def constant_futures(declared: Backup) -> Iterator[Equation]:
+    """Yields the equations in which a constant takes the place of the next values."""
+    offset, last = declared.offset, declared.q.shape[1] - 1
+    mean = float(offset.mean())
+    small = 0.06 < offset.std() < 0.25 * declared.q.std()
+    frozen = bool(small and declared.offset_is_smooth and -0.1 < mean < 2)
+    line = line_fit(declared.q, declared.reward)
+    usual = 0.6 < line.slope < 1.3
+    # No reward is positive, so no other target adds positive numbers that differ.
+    indices = bool(np.mean((offset > -2) & (offset < declared.discount * last + 1)) > 0.8)
+    rewards = line.correlation > 0.7 and 0.45 < line.slope < 1.8
+    indices = indices and (rewards or float(declared.q.mean()) > 1)
+    indices = indices and not frozen and mean > 0.3 and float(offset.std()) > 0.2
+    found = {
+        "no-bootstrapping": usual and not frozen and abs(mean) < 0.1,
+        "frozen-target": usual and frozen,
+        "batch-max": usual and not frozen and not indices and abs(mean) >= 0.1,
+        "index-for-value": indices,
+    }
+    for equation in _offset_equations(declared):
+        yield replace(equation, offset=found[equation.variant or equation.name])
+
+
+def _offset_equations(declared: Backup) -> Iterator[Equation]:
+    def constant(b: Backup) -> Array:
+        return b.reward + b.offset.mean() * b.continues
+
+    last = declared.q.shape[1] - 1
+    yield Equation("no-bootstrapping", "", "r", lambda b: b.reward, share=0.2)
+    yield Equation(
+        "wrong-target",
+        "frozen-target",
+        "r + a small constant",
+        constant,
+        "The values are the rewards of one step plus a little that changes slowly with the next "
+        "state. That is γ·max of a network that never learns: the target network is never copied.",
+        "Copy the online weights into the target network, every 100 to 1000 updates or a little at "
+        "each one.",
+        share=0.2,
+    )
+    yield Equation(
+        "wrong-target",
+        "batch-max",
+        "r + a constant",
+        constant,
+        "The values are the rewards of one step plus a constant: the target takes one maximum for "
+        "the whole batch. So the best state of the batch follows on every state.",
+        "Give the maximum its axis: max(axis=1) of [B, A] is [B].",
+        largest_error=0.1,
+        share=0.2,
+    )
+    yield Equation(
+        "wrong-target",
+        "index-for-value",
+        f"r + γ·(an index from 0 to {last})",
+        constant,
+        "The values are the rewards of one step plus numbers between 0 and A - 1. The target adds "
+        "the index of the best next action, which argmax returns, and not its value.",
+        "Use max in the target; argmax is for acting.",
+        largest_error=1.2,
+    )
+
+
+def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
+    """Yields the same for a task whose reward is constant: then Q - r alone shows them.
+
+    There, the shares of the actions in the batches differ from state to state. But their sum is 1.
+    """
+    offset, last = declared.offset, declared.q.shape[1] - 1
+    mean, spread = float(offset.mean()), float(offset.std())
+    size = float(np.abs(declared.reward).mean())
+    end = float(declared.q[~declared.continues].mean()) if not declared.continues.all() else size
+    none = abs(mean) < 0.03 * size and spread < 0.05 * size
+    small = (
+        not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
+    )
+    # The values of a network that has never learned are smooth, and smaller.
+    index = small and (mean > 0.5 * size or (mean > 0 and not declared.offset_is_smooth))
+    for equation in _offset_equations(declared):
+        offsets = {
+            "no-bootstrapping": none,
+            "frozen-target": small and not index,
+            "index-for-value": index,
+            "batch-max": mean > 2 * size and spread < 0.12 * mean and end < 0.5 * mean,
+        }
+        name = equation.variant or equation.name
+        equation = replace(equation, offset=offsets[name], largest_error=1.6)
+        yield _highest_everywhere(equation) if name == "batch-max" else equation
+    lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
+    yield replace(
+        ZERO_OTHERS,
+        formula="sum of Q(s, ·) / (r + γ·max Q(s′, ·)) = 1",
+        target=lambda b: b.q / (b.q / b.right).sum(axis=1, keepdims=True),
+        share=0.35,
+        offset=lowest < 0.9 * size and highest > 2.5 * size,
+    )
+
+
+def _highest_everywhere(equation: Equation) -> Equation:
+    """Returns `batch-max` for a constant reward: there, `same-state` has the same values."""
+    return replace(
+        equation,
+        variant="batch-max or same-state",
+        share=0.5,
+        explanation="All values are nearly the highest possible one, but not those of a step that "
+        "ends the episode. Either the target takes one maximum for the whole batch, or the values "
+        "of the state itself in place of the next one.",
+        remedy="Give the maximum its axis: max(axis=1) of [B, A] is [B]. And store (s, a, r, s′) "
+        "before s = s′.",
+    )

@@ -1,0 +1,79 @@
+"""An equation that a network may obey in place of the right one, and when it explains a network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from keras_pendulum.diagnosis.backup import Agreement, Backup
+from keras_pendulum.diagnosis.signals import Array
+
+RIGHT = "r + γ·max Q(s′, ·)"
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A wrong equation, and what to say where a network obeys it.
+
+    The defaults of the limits hold for an equation in which the torque matters.
+    """
+
+    name: str  # of the finding
+    variant: str
+    formula: str
+    target: Callable[[Backup], Array]  # returns [N, A]
+    explanation: str = ""  # two sentences; empty takes those of the name
+    remedy: str = ""
+    largest_error: float = 0.25
+    share: float = 0.88  # of the right equation's error that it may have at most
+    flat: float = 0.0  # above 0: the advantages of Q are at most this share of the right ones
+    offset: bool = False  # whether it has no next values, and Q - r is as it says
+    change: dict[str, Any] | None = None  # arguments of `Visited.backup`
+    label: str = ""  # what differs from the declared task
+
+    def explains(self, own: Agreement, right: Agreement, ends: bool = False) -> bool:
+        """Returns whether the network obeys this equation clearly better than the right one.
+
+        `ends` says whether episodes of the task terminate.
+        """
+        if ends and not self.offset and not self.flat:
+            return self._explains_ends(own, right)
+        if own.error > min(self.largest_error, self.share * right.error):
+            return False
+        if self.offset:
+            return True
+        if self.change is None and not 0.8 < own.position < 1.35:
+            return False
+        if self.flat == np.inf:
+            return True
+        if self.flat:
+            # A negative correlation is that of reversed torques.
+            return own.advantages <= self.flat and -0.3 < right.correlation < 0.65
+        return own.correlation > (0.4 if self.variant else 0.3) or own.error < 0.03
+
+    def _explains_ends(self, own: Agreement, right: Agreement) -> bool:
+        """Returns the same for a task whose episodes terminate: its values show more."""
+        error, share, correlation = _LIMITS_WITH_ENDS.get(self.name, (0.2, 0.5, 0.8))
+        if own.error > min(error, share * right.error) or own.correlation < correlation:
+            return False
+        if self.name == "missing-end":
+            return own.at_ends > 0.9
+        if self.name == "torque-map":
+            return right.correlation < -0.6
+        if self.name == "observation-map":
+            return right.correlation < 0.5
+        return True
+
+
+# The largest error, its share of the right equation's error, and the least correlation.
+_LIMITS_WITH_ENDS = {
+    "other-discount": (0.3, 0.4, 0.8),
+    "reward-scale": (0.3, 0.35, 0.8),
+    "reward-sign": (0.3, 0.5, 0.8),
+    "torque-map": (0.4, 0.6, 0.8),
+    "observation-map": (0.3, 0.5, 0.6),
+    "missing-end": (0.25, 0.5, -1.0),
+}

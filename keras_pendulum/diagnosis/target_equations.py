@@ -1,0 +1,98 @@
+"""The equations of wrong targets and losses whose next values are in the target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from keras_pendulum.diagnosis.backup import Backup
+from keras_pendulum.diagnosis.equation import Equation
+from keras_pendulum.diagnosis.signals import Array
+
+
+def _next(values: Callable[[Array], Array]) -> Callable[[Backup], Array]:
+    """Returns a target: r + γ · these of the next values."""
+    return lambda b: b.reward + b.future * values(b.next_q)
+
+
+_TARGET = "Its fixed point has other values, so the greedy policy follows another task."
+_TAKE_MAXIMUM = "Take the maximum over the actions: axis 1 of [B, A], of the next state's values."
+
+ZERO_OTHERS = Equation(
+    "wrong-loss",
+    "zero-others",
+    "(r + γ·max Q(s′, ·)) / A",
+    lambda b: b.right / b.q.shape[1],
+    "The loss compares the outputs that did not act with zero. So each value is the target "
+    "times the share of its action in the batches, about 1/A.",
+    "Compare only the output of the stored action: take Q(s, a), or give the others their own "
+    "values as targets.",
+    largest_error=0.4,
+    share=0.1,
+    flat=np.inf,
+)
+
+TARGETS = (
+    Equation(
+        "wrong-target",
+        "mean-next",
+        "r + γ·mean Q(s′, ·)",
+        _next(lambda q: q.mean(axis=2)),
+        f"The target takes the mean of the next values, not their maximum. {_TARGET}",
+        _TAKE_MAXIMUM,
+    ),
+    Equation(
+        "wrong-target",
+        "min-next",
+        "r + γ·min Q(s′, ·)",
+        _next(lambda q: q.min(axis=2)),
+        f"The target takes the lowest of the next values, not the highest. {_TARGET}",
+        f"{_TAKE_MAXIMUM} Of costs take the minimum, but then act by the lowest value, too.",
+    ),
+    Equation(
+        "wrong-target",
+        "fixed-action-next",
+        "r + γ·Q(s′, first action)",
+        _next(lambda q: q[:, :, 0]),
+        f"The target takes the value of the first action, whatever the next state is. {_TARGET}",
+        f"{_TAKE_MAXIMUM} An index [0] in place of max does this.",
+    ),
+    Equation(
+        "wrong-target",
+        "fixed-action-next",
+        "r + γ·Q(s′, last action)",
+        _next(lambda q: q[:, :, -1]),
+        f"The target takes the value of the last action, whatever the next state is. {_TARGET}",
+        f"{_TAKE_MAXIMUM} An index [-1] in place of max does this.",
+    ),
+    Equation(
+        "wrong-target",
+        "same-state",
+        "r + γ·max Q(s, ·)",
+        lambda b: b.reward + b.future * b.q.max(axis=1, keepdims=True),
+        "The target takes the values of the state itself, so no action has a consequence. The next "
+        "state is stored as the state, or the variable is set too early.",
+        "Store (s, a, r, s′) before s = s′, and copy the observation where the environment changes "
+        "it in place.",
+        share=0.2,
+        flat=0.3,
+    ),
+    Equation(
+        "missing-end",
+        "",
+        "r + γ·max Q(s′, ·), also at an end",
+        lambda b: b.reward + b.discount * b.next_q.max(axis=2),
+    ),
+    ZERO_OTHERS,
+    Equation(
+        "wrong-loss",
+        "same-target",
+        "mean over a of r + γ·max Q(s′, ·)",
+        lambda b: b.right.mean(axis=1, keepdims=True) + 0 * b.q,
+        "The loss compares all outputs with the target of the one action that was taken. So the "
+        "values are right on average, and the same for all actions.",
+        "Compare only the output of the stored action: take Q(s, a) by gather or a mask.",
+        flat=0.06,
+    ),
+)
