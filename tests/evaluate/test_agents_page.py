@@ -27,7 +27,7 @@ def test_example_prints_a_regret(
     printed = capsys.readouterr().out
     found = re.search(r"Regret: ([\d.]+)", printed) or re.fullmatch(r"([\d.]+)\n", printed)
     assert found is not None
-    assert 0 < float(found.group(1)) < 3000
+    assert 0 <= float(found.group(1)) < 3000
     assert ("Regret from learning" in printed) == ("discount=" in example or "SAC" in example)
 
 

@@ -94,7 +94,8 @@ def test_no_cell_prints_an_error_or_a_note_of_tensorflow(executed: Any) -> None:
 def test_stored_outputs_are_of_the_kinds_that_the_cells_make(executed: Any, stored: Any) -> None:
     def kinds(notebook: Any) -> list[list[str]]:
         cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
-        return [[output.output_type for output in cell.outputs] for cell in cells]
+        # On a busy machine, a text may arrive after the picture that follows it.
+        return [sorted(output.output_type for output in cell.outputs) for cell in cells]
 
     assert kinds(stored) == kinds(executed)
 
