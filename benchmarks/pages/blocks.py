@@ -35,7 +35,6 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "recorded runs": code_blocks.recorded_runs,
     "recorded run of CartPole": lambda: markdown(rows_of("recorded_cartpole")),
     "learning of CartPole": lambda: markdown(rows_of("cartpole_learning")),
-    "installation": lambda: markdown(rows_of("installation")),
     "falls of CartPole": lambda: markdown(rows_of("cartpole_falls")),
     "speed of CartPole": code_blocks.cartpole_speed,
     "speeds": code_blocks.speeds,
