@@ -29,10 +29,10 @@ def executed(tmp_path_factory: pytest.TempPathFactory) -> Any:
     notebook: Any = nbformat.read(NOTEBOOK, as_version=4)  # type: ignore[no-untyped-call]
     for cell in notebook.cells:
         cell.source = re.sub(r"^STEPS = [\d_]+", "STEPS = 1_200", cell.source, flags=re.MULTILINE)
-    # With this variable, the kernel would not show what C++ code prints.
-    environment = {
-        name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"
-    }
+    # With the first one, the kernel would not show what C++ code prints, with the other one no
+    # pictures. Tests in the same process may have set them.
+    unwanted = ("PYTEST_CURRENT_TEST", "MPLBACKEND")
+    environment = {name: value for name, value in os.environ.items() if name not in unwanted}
     execute(notebook, tmp_path_factory.mktemp("notebook"), env=environment)
     return notebook
 
