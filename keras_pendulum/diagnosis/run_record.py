@@ -67,7 +67,7 @@ def make_record(
 
 @dataclass(frozen=True)
 class RunRecord:
-    """What is known of a run: as much as a run folder, a recorder or a replay buffer shows."""
+    """The known facts of a run: as much as a run folder, a recorder or a replay buffer shows."""
 
     config: Config | None
     history: list[EpisodeRecord]

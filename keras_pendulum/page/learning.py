@@ -1,4 +1,4 @@
-"""What the page needs to train a network itself: settings, faults as switches, and starts."""
+"""The settings, the faults as switches, and the starts with which the page trains a network."""
 
 from __future__ import annotations
 

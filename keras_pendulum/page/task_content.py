@@ -1,4 +1,4 @@
-"""What the page knows of a task: its optimum, and the folder of its scripts and texts."""
+"""The content of the page for a task: its optimum, and the folder of its scripts and texts."""
 
 from __future__ import annotations
 

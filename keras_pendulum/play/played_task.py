@@ -18,7 +18,7 @@ Observation = NDArray[np.float32]
 
 
 class PlayedTask(ABC):
-    """What the game knows of a task. A further one has a subclass in a module of its own."""
+    """A task in the game. A further one has a subclass in a module of its own."""
 
     effort: ClassVar[str]  # what a key sets, such as the torque
     unit: ClassVar[str]
@@ -36,7 +36,7 @@ class PlayedTask(ABC):
 
     @property
     def setting(self) -> str:
-        """What the window says of the physics or of the clock."""
+        """The line of the window on the physics or on the clock."""
         return ""
 
     @abstractmethod
