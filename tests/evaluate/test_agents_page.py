@@ -27,7 +27,9 @@ def test_example_prints_a_regret(
     printed = capsys.readouterr().out
     found = re.search(r"Regret: ([\d.]+)", printed) or re.fullmatch(r"([\d.]+)\n", printed)
     assert found is not None
-    assert 0 <= float(found.group(1)) < 3000
+    regret = float(found.group(1))
+    is_perfect = regret == 0 and "CartPole-v1" in example  # its pole never falls
+    assert 0 < regret < 3000 or is_perfect
     assert ("Regret from learning" in printed) == ("discount=" in example or "SAC" in example)
 
 
