@@ -53,8 +53,7 @@ class LessonControls {
     for (const { name, title, sentence } of switches) {
       const label = document.createElement("label");
       const box = Object.assign(document.createElement("input"), { type: "checkbox", value: name });
-      box.setAttribute("aria-description", sentence);
-      label.title = sentence;
+      label.title = box.title = sentence; // that of the box is its description for screen readers
       label.append(box, title);
       element("faults").append(label);
     }
