@@ -80,6 +80,7 @@ def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
         "evaluatedReturn": recorded_return(path),
         "sizes": [network.observation_size, *network.hidden_units, network.action_count],
         "activation": network.activation,
+        "discount": info.discount,
         "rewardScale": info.reward_scale,
         "weights": base64.b85encode(weights).decode().replace("<", ","),
     }

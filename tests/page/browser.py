@@ -143,7 +143,10 @@ class Player:
         self.redraw()
         width, pixels = self.run(
             "const c = document.getElementById(arguments[0]);"
-            "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
+            # From a copy: the browser warns of a canvas that is read again and again.
+            "const copy = new OffscreenCanvas(c.width, c.height).getContext('2d');"
+            "copy.drawImage(c, 0, 0);"
+            "const d = copy.getImageData(0, 0, c.width, c.height).data;"
             "let s = ''; for (let i = 0; i < d.length; i += 8192)"
             "  s += String.fromCharCode(...d.subarray(i, i + 8192)); return [c.width, s]",
             id,

@@ -133,12 +133,12 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
 ) -> None:
     player.open(pages["small"])
     order = []
-    for _ in range(10):
+    for _ in range(11):
         player.press(Keys.TAB)
         order.append(player.focus())
         outline = "getComputedStyle(document.activeElement).outline"
         assert "solid 3px" in player.run(f"return {outline}")
-    buttons = ["take-over", "pause", "one-step", "restart", "1", "0", "-1", "0", "2"]
+    buttons = ["hang", "take-over", "pause", "one-step", "restart", "1", "0", "-1", "0", "2"]
     assert order == ["tab-watch", *buttons]
     player.press(Keys.SPACE)  # the button's own key, not the pause
     assert player.text("status") == "The network drives."
@@ -156,11 +156,18 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
 
 def test_score_of_the_last_episode_does_not_stay_beside_another_one(user: Player) -> None:
     first = user.text("score")
-    for act in ("r", "h"):
+    acts = [lambda: user.press("r"), lambda: user.press("h"), lambda: user.find("hang").click()]
+    for act in acts:
         user.run("while (!pendulum.page.over) pendulum.step()")
         assert user.text("score").startswith("Score: network ")
-        user.press(act)
+        act()
         assert user.text("score") == first
+
+
+def test_button_hang_starts_where_the_key_does(user: Player) -> None:
+    user.find("hang").click()
+    assert user.state()["theta"] == pytest.approx(np.pi)
+    assert user.state()["thetadot"] == user.state()["steps"] == 0
 
 
 def test_numbers_that_change_all_the_time_are_no_live_regions(user: Player) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import keras_pendulum as kp
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import TorqueGrid
 from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.optimum.pendulum import PendulumSolution
 
 
 @pytest.mark.parametrize("theta", [0.8, -2.0, 3.0])
@@ -49,43 +51,61 @@ def test_arrow_of_a_positive_torque_turns_counter_clockwise(
     assert side * columns.mean() > 1
 
 
-def test_every_torque_has_a_bar_and_the_highest_is_the_greedy_one(
+def test_every_torque_has_a_bar_from_zero_and_a_mark_at_its_exact_value(
     pages: dict[str, str], player: Player
 ) -> None:
     player.open_paused(pages["swingup"])
-    player.run("pendulum.reset(2, 1)")
-    state = player.state()
-    picture = player.picture("bars")
-    left, right = 76, picture.shape[1] - 6
-    middles = left + (np.arange(41) + 0.5) * (right - left) / 41
-    tops = np.array([np.nonzero(picture[13:, round(m), 3])[0][0] for m in middles])
-    q = np.array(state["qValues"])
-    assert state["best"] == q.argmax()
-    assert tops[state["best"]] == tops.min()  # another bar may have the same height in pixels
-    lowest = player.run("return pendulum.page.view.floor")
-    scale = kp.load_policy("swingup").info.reward_scale
-    heights = 1 - (q - q.max()) / scale / lowest
-    floor = picture.shape[0] - 38 - 4 - 13  # a bar for the lowest value has 4 px
-    np.testing.assert_allclose(1 - (tops + 1) / (floor + 1), heights, atol=0.03)
-    value = player.text("best").split(": ")[1].replace("−", "-")
-    assert float(value) == pytest.approx(
-        q.max() / kp.load_policy("swingup").info.reward_scale, abs=0.01
+    wait_for(lambda: player.run("return pendulum.page.exact !== null"))
+    exact = player.run(
+        "const {page} = pendulum; page.restart(2, 1); page.drive(true); page.choose(1);"
+        "return page.exact.qValues([2, 1], page.episode.network.efforts)"
     )
+    policy = kp.load_policy("swingup")
+    solution = PendulumSolution(Pendulum(10.0))
+    discount = policy.info.discount
+    assert discount is not None
+    torques = np.linspace(-2, 2, 41)
+    table = solution.table(discount)
+    expected = solution.exact_q(table, discount, np.array([[2.0, 1.0]]), torques)
+    np.testing.assert_allclose(exact, expected[0], atol=0.05 * np.ptp(table))
+
+    path = list(bytes.fromhex(player.run("return pendulum.page.view.colours.path")[1:]))
+    end = player.run("return pendulum.page.view.end")
+    for name in ("marks", "bars"):
+        picture = player.picture("bars")
+        seen = (picture[..., :3] == path).all(axis=-1) if name == "marks" else picture[..., 3] > 0
+        left, right = 76, picture.shape[1] - 6
+        middles = np.round(left + (np.arange(41) + 0.5) * (right - left) / 41).astype(int)
+        # The lowest row of each bar or mark, above the axis.
+        rows = [np.nonzero(seen[:-39, middle])[0].max() for middle in middles]
+        found = (np.array(rows) - 12) / (picture.shape[0] - 38 - 12) * end
+        if name == "marks":
+            np.testing.assert_allclose(found, exact, atol=0.02 * abs(end))
+            player.run("pendulum.page.exact = null")
+    state = player.state()
+    q = np.array(state["qValues"]) / policy.info.reward_scale
+    assert state["best"] == q.argmax()
+    np.testing.assert_allclose(found, q, atol=0.02 * abs(end))
+    best, worst = re.findall(r"[−\d.]+(?=,|$)", player.text("best"))
+    assert float(best.replace("−", "-")) == pytest.approx(q.max(), abs=0.01)
+    assert float(worst.replace("−", "-")) == pytest.approx(q.min(), abs=0.01)
 
 
 def test_axis_of_the_bars_is_round_and_stays_while_the_values_fill_it(user: Player) -> None:
 
-    def floor(lowest: float, before: float | None = None) -> float:
-        return float(user.run("return steadyFloor(arguments[0], arguments[1])", lowest, before))
+    def end(farthest: float, before: float | None = None) -> float:
+        return float(user.run("return steadyEnd(arguments[0], arguments[1])", farthest, before))
 
-    assert floor(-3.4) == -5
-    assert floor(-5) == -5
-    assert floor(-13.2) == -20
-    assert floor(-0.013) == pytest.approx(-0.02)
-    assert floor(-0.51, -5) == -5  # fills a tenth of the axis
-    assert floor(-0.49, -5) == -0.5
-    assert floor(-5.1, -5) == -10
-    assert floor(0) == pytest.approx(-0.001)  # equal values need an axis too
+    assert end(-3.4) == -5
+    assert end(3.4) == 5
+    assert end(-5) == -5
+    assert end(-13.2) == -20
+    assert end(-0.013) == -1  # small values look small
+    assert end(-1.01, -5) == -5  # fills a fifth of the axis
+    assert end(-0.99, -5) == -5  # 1 is the shortest axis
+    assert end(1.5, -5) == 2
+    assert end(-5.1, -5) == -10
+    assert end(0) == 1
 
 
 def test_axis_of_the_bars_moves_a_few_times_in_an_episode(
@@ -97,7 +117,7 @@ def test_axis_of_the_bars_moves_a_few_times_in_an_episode(
         "pendulum.reset(2.5, 0);"
         "for (let i = 0; i < 200; i++) {"
         "  pendulum.step(); view.drawRest();"
-        "  moves += view.floor !== before; before = view.floor;"
+        "  moves += view.end !== before; before = view.end;"
         "}"
         "return moves"
     )

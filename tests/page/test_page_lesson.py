@@ -214,7 +214,7 @@ def test_exact_values_are_those_of_the_package(pages: dict[str, str], player: Pl
     states = np.random.RandomState(0).uniform([-np.pi, -6], [np.pi, 6], (200, 2))
     found = np.array(
         player.run(
-            "return arguments[0].map(s => pendulum.lesson.exact.table.value(s))", states.tolist()
+            "return arguments[0].map(s => pendulum.lesson.exact.of.value(s))", states.tolist()
         )
     )
     exact = PendulumSolution(Pendulum(1.0))
@@ -304,7 +304,16 @@ def test_cartpole_learns_in_the_page(pages: dict[str, str], player: Player) -> N
     player.open(f"{pages['cartpole']}#fault=no-target&network=8")
     wait_for(lambda: player.run("return Boolean(pendulum.lesson)"))
     step(player, 2)
-    assert not player.find("exact-figure").is_displayed()  # values on four axes take too long
+    assert not player.find("sweep").is_displayed()  # a table on four axes takes too long
+    wait_for(lambda: player.run("return Boolean(pendulum.lesson.exact)"))
+    values, backup = player.run(
+        "const {lesson} = pendulum; const state = [0, 0, ...cellState(lesson.task, 49, 20, 22)];"
+        "return [lesson.exact.values[20 * 49 + 22], lesson.backup(lesson.runs[0], state)]"
+    )
+    assert values == pytest.approx(max(backup["exact"]), abs=0.1)  # by fewer exact steps
+    assert 90 < values < 100
+    player.driver.find_element(By.CSS_SELECTOR, '[data-learned-layer="error"]').click()
+    wait_for(lambda: player.find("learned-scale").get_attribute("data-scale") == "error")
     assert not player.driver.find_elements(By.CSS_SELECTOR, '#faults [value="truncated-index"]')
     one, other = records(player)
     assert one[0]["steps"] == one[0]["episodeReturn"] == other[0]["episodeReturn"] < 500

@@ -48,6 +48,9 @@ class Controls {
     click(element("pause"), () => page.pause());
     click(element("one-step"), () => page.oneStep());
     click(element("restart"), () => page.restartAnew());
+    const { hanging } = page.task;
+    element("hang").hidden = !hanging;
+    click(element("hang"), () => page.restartAnew(...hanging));
     click(element("play-training"), () => page.playTraining());
     for (const button of document.querySelectorAll("[data-direction]")) {
       const act = () => page.choose(Number(button.dataset.direction));

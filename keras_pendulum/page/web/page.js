@@ -34,8 +34,18 @@ class Page {
     this.view = new View(this);
     this.controls = new Controls(this);
     this.controls.update();
+    this.exact = null; // for the γ of the network
+    this.#findExact();
     this.training?.listen((network, map) => this.replaceNetwork(network, map));
     requestAnimationFrame((now) => this.frame(now, now));
+  }
+
+  /** Computes the exact Q-values beside the page; where it cannot, they are not shown. */
+  async #findExact() {
+    const { recorded, optimum } = this;
+    this.exact = await optimum.exactValues(recorded, recorded.discount).catch(() => null);
+    element("exact-key").hidden = !this.exact;
+    this.redraw();
   }
 
   /** Takes the steps that are due and draws. */

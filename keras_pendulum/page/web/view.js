@@ -56,11 +56,15 @@ class View {
     element("optimum").textContent = page.held ? "–" : shown(page.optimalReturn, task.returnDigits);
     const { best, youDrive, yourEffort } = episode;
     const values = Array.from(episode.qValues, (value) => value / page.recorded.rewardScale);
-    this.floor = steadyFloor(Math.min(...values) - values[best], this.floor);
+    const exact = page.exact?.qValues(episode.state, efforts);
+    const farthest = [...values, ...(exact ?? [])].reduce((a, b) => (Math.abs(b) > Math.abs(a) ? b : a));
+    this.end = steadyEnd(farthest, this.end);
     const greedy = task.bestText(efforts[best], efforts);
-    element("best").textContent = `${greedy}: ${shown(values[best], 2)}`;
+    const worst = shown(Math.min(...values), 2);
+    element("best").textContent = `${greedy}: ${shown(values[best], 2)}, worst ${worst}`;
     const taken = youDrive ? yourEffort : efforts[best];
-    drawBars(element("bars"), colours, task, efforts, values, this.floor, best, taken);
+    const { end } = this;
+    drawBars(element("bars"), colours, task, { efforts, values, exact, best, end, taken });
     const pictureOf = (width, height) => {
       const { picture } = this;
       if (picture?.width === width && picture.height === height) return picture;

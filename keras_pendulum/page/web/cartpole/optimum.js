@@ -46,6 +46,12 @@ class Optimum {
     return simulatedReturn(task, state, task.episodeSteps, (each) => this.#better(each));
   }
 
+  /** Resolves to the exact values for a discount; null for another one than that of the table. */
+  async exactValues(recorded, discount) {
+    if (discount !== this.discount) return null;
+    return new ExactValues(this.task, discount, (state) => this.value(state));
+  }
+
   #better(state) {
     const [left, right] = this.task.efforts();
     return this.qValue(state, right) > this.qValue(state, left) ? right : left;

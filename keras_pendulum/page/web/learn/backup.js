@@ -6,9 +6,9 @@ class Backup {
    * @param {number[]} state
    * @param {Network} network of the run.
    * @param {object} settings of the run.
-   * @param {?ValueTable} exact the exact values for `discount`.
+   * @param {?ExactValues} exact
    */
-  constructor(state, network, settings, exact, discount) {
+  constructor(state, network, settings, exact) {
     const { task, efforts } = network;
     const scale = settings.reward_scale;
     const bootstrap = BOOTSTRAPS[settings.bootstrap];
@@ -21,7 +21,7 @@ class Backup {
       const future = over ? 0 : bootstrap(values, values, 0, values.length) / scale;
       return settings.reward_factor * reward + settings.discount * future;
     });
-    this.exact = exact && this.steps.map(({ state: next, reward }) => reward + discount * exact.value(next));
+    this.exact = exact && exact.qValues(state, efforts);
   }
 
   /** Returns the backup of the greedy effort in words. */
@@ -91,7 +91,10 @@ function drawBackup(canvas, colours, task, { efforts, qValues, targets, exact, b
   context.lineWidth = 1;
   line(context, [[left, top], [left, bottom], [right, bottom]]);
   for (const value of [lowest, highest]) write(context, shown(value, 1), left - 6, y(value), "right");
-  for (const [effort, label] of task.effortTicks) write(context, label, x(effort), bottom + 12);
+  for (const [effort, label] of task.effortTicks) {
+    const side = { [-task.maxEffort]: "left", [task.maxEffort]: "right" }[effort];
+    write(context, label, x(effort), bottom + 12, side);
+  }
   write(context, task.effortAxis, (left + right) / 2, bottom + 27);
   line(context, [[x(efforts[best]), top], [x(efforts[best]), bottom]]);
   const curve = (values) => values.map((value, i) => [x(efforts[i]), y(value)]);

@@ -38,7 +38,7 @@ class Layers {
   ends(layer, map) {
     if (layer === "effort") return [-this.task.maxEffort, this.task.maxEffort];
     if (layer === "error") {
-      const largest = ERROR_SHARE * (this.range[1] - this.range[0]);
+      const largest = this.range ? ERROR_SHARE * (this.range[1] - this.range[0]) : 1;
       return [-largest, largest];
     }
     if (layer === "visits") return [0, Math.log1p(map?.visits ? map.visits.reduce((a, b) => Math.max(a, b), 0) : 1)];

@@ -59,20 +59,20 @@ function learnedMap(network, task, efforts) {
   return map;
 }
 
-/** Returns the values of a table over the phase plane, and the efforts that are greedy for them. */
-function sweptMap(table, efforts, discount) {
+/** Returns a map of efforts and values; `solved` returns both for a state. */
+function mapOf(task, solved) {
   const size = LEARNED_MAP_SIZE;
-  const { task } = table;
   const map = { efforts: new Float32Array(size ** 2), values: new Float32Array(size ** 2) };
+  const others = task.randomStart().slice(2).fill(0);
   for (let i = 0; i < size ** 2; i++) {
-    const state = cellState(task, size, Math.floor(i / size), i % size);
-    let highest = -Infinity;
-    for (const effort of efforts) {
-      const next = task.advanced(state, effort);
-      const value = next.reward + discount * table.value(next.state);
-      if (value > highest) [highest, map.efforts[i]] = [value, effort];
-    }
-    map.values[i] = table.value(state);
+    const state = [...others, ...cellState(task, size, Math.floor(i / size), i % size)];
+    [map.efforts[i], map.values[i]] = solved(state);
   }
   return map;
+}
+
+/** Returns the values of a table over the phase plane, and the efforts that are greedy for them. */
+function sweptMap(table, efforts, discount) {
+  const exact = new ExactValues(table.task, discount, (state) => table.value(state));
+  return mapOf(table.task, (state) => [efforts[argmax(exact.qValues(state, efforts))], table.value(state)]);
 }

@@ -16,9 +16,9 @@ class Lesson {
     this.running = false;
     this.runs = [];
     this.problem = "";
-    this.exact = null; // {values, efforts, table} of the solution
+    this.exact = null; // {values, efforts} of the solution over the map, and `of`, its ExactValues
     this.swept = null; // the same after some sweeps, and `sweeps`
-    this.hasExact = task.randomStart().length === 2;
+    this.canSweep = task.randomStart().length === 2; // a table on more axes takes too long
     this.#reset();
   }
 
@@ -99,11 +99,17 @@ class Lesson {
   }
 
   /** Computes the exact values, once. */
-  async solve() {
-    if (!this.hasExact || this.#solver) return;
+  async solve(optimum) {
+    if (this.#solver) return;
     this.#solver = new LearningWorker();
-    await this.#startSweeps();
-    this.exact = this.swept = await this.#sweep({});
+    if (this.canSweep) {
+      await this.#startSweeps();
+      this.exact = this.swept = await this.#sweep({});
+    } else {
+      const of = await optimum.exactValues(this.recorded, this.discount);
+      const map = await this.#solver.call("optimalMap", { recorded: withoutNetworks(this.recorded) });
+      if (of) this.exact = this.swept = { ...map, of };
+    }
     this.changed();
   }
 
@@ -136,7 +142,9 @@ class Lesson {
 
   async #sweep(argument) {
     const result = await this.#solver.call("sweep", argument);
-    return { ...result, ...result.map, table: new ValueTable(this.task, result.values) };
+    const table = new ValueTable(this.task, result.values);
+    const of = new ExactValues(this.task, this.discount, (state) => table.value(state));
+    return { ...result, ...result.map, of };
   }
 
   /** γ of the healthy run. */
@@ -152,7 +160,7 @@ class Lesson {
       const recorded = { sizes, activation: settings.activation };
       Object.assign(run, { network: new Network(recorded, last.weights, this.task), networkOf: last });
     }
-    return new Backup(state, run.network, settings, this.exact?.table, this.discount);
+    return new Backup(state, run.network, settings, this.exact?.of);
   }
 }
 

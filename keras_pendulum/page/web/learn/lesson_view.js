@@ -112,7 +112,8 @@ class LessonView {
     element("scale-high").textContent = `${text(highest)} ${layer === "effort" ? task.effortAxis : LAYER_TITLES[layer]}`;
     element("learned-scale").dataset.scale = layer;
     const { swept } = lesson;
-    element("sweeps").textContent = swept ? `${swept.sweeps} sweeps, γ = ${lesson.discount}` : "computing …";
+    const sweeps = swept?.sweeps ? `${swept.sweeps} sweeps, ` : "";
+    element("sweeps").textContent = swept ? `${sweeps}γ = ${lesson.discount}` : "computing …";
     element("sweep").firstElementChild.textContent = lesson.isSweeping ? "Stop" : "Sweep from 0";
   }
 

@@ -57,11 +57,6 @@ class LearningRun {
   }
 }
 
-/** Returns what a worker needs of the page's content. */
-function withoutNetworks({ gravity, optimum, learning }) {
-  return { gravity, optimum, learning };
-}
-
 /** Trains a network to the end; resolves to its greedy regret, the updates and the seconds. */
 async function trainInPage(recorded, { fault = "", ...others }) {
   const names = fault.split(",").filter(Boolean);

@@ -38,12 +38,11 @@ function startLearning(page) {
     lesson = new Lesson(recorded, task, readAddress(location.hash, learning), redraw);
     view = new LessonView(lesson, task);
     controls = new LessonControls(lesson, view, redraw);
-    element("exact-figure").hidden = !lesson.hasExact;
-    document.querySelector('[data-learned-layer="error"]').hidden = !lesson.hasExact;
+    element("sweep").hidden = !lesson.canSweep;
     const sizes = new ResizeObserver(redraw);
     document.querySelectorAll("#learn canvas").forEach((canvas) => sizes.observe(canvas));
     measureTimes(recorded, controls).catch(fail);
-    lesson.solve().catch(fail);
+    lesson.solve(page.optimum).catch(fail);
   };
   const tabs = new Tabs((name) => {
     if (name === "learn") open();

@@ -46,3 +46,8 @@ class LearningWorker {
     this.#waiting.clear();
   }
 }
+
+/** Returns what a worker needs of the page's content. */
+function withoutNetworks({ gravity, optimum, learning }) {
+  return { gravity, optimum, learning };
+}

@@ -69,6 +69,13 @@ class WorkerMethods {
     return null;
   }
 
+  /** Returns the map of the optimum, for a task whose table is in the page. */
+  optimalMap({ recorded }) {
+    const task = new Task(recorded);
+    const optimum = new Optimum(recorded.optimum, task);
+    return mapOf(task, (state) => [optimum.effort(state), optimum.value(state)]);
+  }
+
   /** Makes some sweeps, all that the solution needs by default; returns the values and their map. */
   sweep({ count = Infinity }) {
     const { iteration } = this;

@@ -3,6 +3,7 @@
 const OPTIMUM_TORQUES = Array.from({ length: 41 }, (_, i) => (i - 20) / 10); // N·m
 const SMOOTH_TOLERANCE = 0.05; // a larger difference of value and return means a discontinuity
 const SEARCHED_STEPS = 3;
+const LARGEST_DISCOUNT = 0.995; // a larger one needs thousands of sweeps
 
 /** The optimum: greedy on a table of the optimal value, as keras_pendulum/optimum describes it. */
 class Optimum {
@@ -53,6 +54,20 @@ class Optimum {
 
   #greedyReturn(state, steps) {
     return simulatedReturn(this.task, state, steps, (each) => this.effort(each));
+  }
+
+  /** Resolves to the exact values for a discount, from a table that a worker makes; null for γ near 1. */
+  async exactValues(recorded, discount) {
+    if (!(discount <= LARGEST_DISCOUNT)) return null;
+    const worker = new LearningWorker();
+    try {
+      await worker.call("startSweeps", { recorded: withoutNetworks(recorded), discount });
+      const { values } = await worker.call("sweep");
+      const table = new ValueTable(this.task, values);
+      return new ExactValues(this.task, discount, (state) => table.value(state));
+    } finally {
+      worker.end();
+    }
   }
 
   /** Tries every torque in the first steps; the torque afterwards is greedy. */
