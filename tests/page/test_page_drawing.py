@@ -70,9 +70,9 @@ def test_every_torque_has_a_bar_from_zero_and_a_mark_at_its_exact_value(
     np.testing.assert_allclose(exact, expected[0], atol=0.05 * np.ptp(table))
 
     path = list(bytes.fromhex(player.run("return pendulum.page.view.colours.path")[1:]))
-    end = player.run("return pendulum.page.view.end")
     for name in ("marks", "bars"):
         picture = player.picture("bars")
+        end = player.run("return pendulum.page.view.end")
         seen = (picture[..., :3] == path).all(axis=-1) if name == "marks" else picture[..., 3] > 0
         left, right = 76, picture.shape[1] - 6
         middles = np.round(left + (np.arange(41) + 0.5) * (right - left) / 41).astype(int)
