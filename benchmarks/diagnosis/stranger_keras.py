@@ -39,10 +39,10 @@ class KerasNetwork:
 
     def update(self, batch: tuple[Array, ...]) -> None:
         """Makes one step of Adam."""
-        self._step(*map(tf.convert_to_tensor, batch))
-        self._arrays = [variable.numpy() for variable in self.online.trainable_variables]
+        self._arrays = [array.numpy() for array in self._step(*map(tf.convert_to_tensor, batch))]
 
-    def _train(self, s: Any, a: Any, r: Any, following: Any, end: Any) -> None:
+    def _train(self, s: Any, a: Any, r: Any, following: Any, end: Any) -> list[Any]:
+        """Returns the new weights, because to read each of them takes as long as the step."""
         program = self._program
         with tf.GradientTape() as tape:
             q = self.online(s)
@@ -62,6 +62,7 @@ class KerasNetwork:
                 loss = tf.reduce_mean((chosen[:, None] - target) ** 2)
         variables = self.online.trainable_variables
         self._adam.apply_gradients(zip(tape.gradient(loss, variables), variables, strict=True))
+        return [variable.value for variable in variables]
 
     def _targets(self, following: Any, same: Any, r: Any, end: Any) -> Any:
         values = {
