@@ -393,3 +393,22 @@ def test_keras_model_of_one_row_gets_one_row(network: kp.DQN) -> None:
     policy = as_policy(model)
     assert policy.q_values(rows) == pytest.approx(model(rows[:, None]).numpy())
     assert kp.evaluate_policy(model, 1, gravity=1.0).regret > 0
+
+
+def test_model_of_a_class_of_ones_own_is_not_compiled() -> None:
+    calls = []
+
+    class Counting(keras.Model):
+        def __init__(self) -> None:
+            super().__init__()
+            self.head = keras.layers.Dense(5)
+
+        def call(self, observations: Any) -> Any:
+            calls.append(observations.numpy().shape)  # what a graph cannot
+            return self.head(observations)
+
+    model = Counting()
+    model(np.zeros((1, 3), np.float32))
+    calls.clear()
+    kp.evaluate_policy(model, episodes=1, gravity=1)
+    assert len(calls) >= 200
