@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +23,7 @@ LIKELY_CHANGES = (
 
 
 _FACTORS = {"half the torque": 0.5, "double the torque": 2.0}
-_FEW_STARTS = 6  # to choose the change of the observation that is played on all
+_FEW_STARTS = 4  # to choose the changes that are played on all
 
 
 def change_efforts(m: Measurement, efforts: Array, name: str) -> Repair:
@@ -57,17 +56,18 @@ def _scale_efforts(m: Measurement, name: str, factor: float) -> Repair:
 def find_by_repairs(m: Measurement) -> list[Finding]:
     """Returns the finding on a policy without Q-values: the simple change that helps most.
 
-    Where the policy is fast, each order and sign of the observation is tried on a few starts.
+    Where the policy is fast, each change is tried on a few starts, also each order and sign of the
+    observation, and the best of each kind is played on all.
     """
     factors = {f"{m.dynamics.effort} reversed": -1.0} | (_FACTORS if m.dynamics.any_effort else {})
-    repairs = [("torque-map", _scale_efforts(m, *item)) for item in factors.items()]
     changes = observation_changes(m.dynamics)
-    names: Sequence[str] = [name for name in LIKELY_CHANGES if name in changes]
+    scaled, changed = list(factors), [name for name in LIKELY_CHANGES if name in changes]
     if m.start_count == STARTS:
         few = replace(m, start_count=_FEW_STARTS)
-        tried = {name: change_observations(few, name).regret for name in changes}
-        names = sorted(tried, key=lambda name: tried[name])[:1]
-    repairs += [("observation-map", change_observations(m, name)) for name in names]
+        scaled = [min(scaled, key=lambda name: _scale_efforts(few, name, factors[name]).regret)]
+        changed = [min(changes, key=lambda name: change_observations(few, name).regret)]
+    repairs = [("torque-map", _scale_efforts(m, name, factors[name])) for name in scaled]
+    repairs += [("observation-map", change_observations(m, name)) for name in changed]
     name, best = min(repairs, key=lambda item: item[1].regret)
     if best.won <= 0.5 * m.avoidable_regret:
         return []

@@ -58,10 +58,9 @@ def simulate(act: Act, exact: KnownDynamics, starts: Array) -> Episodes:
         states[step], playing[step] = state, on
         if not on.any():
             continue
-        effort = np.nan_to_num(
-            np.asarray(act(exact.observe(state)), np.float64), posinf=0, neginf=0
-        )
-        outcomes = exact.outcomes(state, np.clip(effort, -limit, limit)[:, None])
+        effort = np.asarray(act(exact.observe(state)), np.float64)
+        effort = np.where(np.isfinite(effort), effort, 0).clip(-limit, limit)
+        outcomes = exact.outcomes(state, effort[:, None])
         rewards[step, on] = outcomes.reward[on, 0]
         state = np.where(on[:, None], outcomes.state[:, 0], state)
         on = on & ~outcomes.terminated[:, 0]

@@ -52,7 +52,10 @@ class PendulumSolution(KnownDynamics):
     def observe(self, states: Array) -> NDArray[np.float32]:
         """Returns the observations [N, 3] of states [N, 2]."""
         theta, speed = states.T
-        return np.stack([np.cos(theta), np.sin(theta), speed], axis=1).astype(np.float32)
+        observations = np.empty((len(states), 3), np.float32)  # `stack` takes most of a single step
+        observations[:, 0], observations[:, 1] = np.cos(theta), np.sin(theta)
+        observations[:, 2] = speed
+        return observations
 
     def states_of(self, observations: NDArray[Any]) -> Array:
         """Returns the states [N, 2] of observations [N, 3]."""
@@ -68,7 +71,9 @@ class PendulumSolution(KnownDynamics):
         reward, theta, speed = step_all_torques(
             self.task.gravity, states[:, 0], states[:, 1], efforts
         )
-        return Outcomes(reward, np.stack([theta, speed], axis=2), np.zeros(reward.shape, bool))
+        following = np.empty((*theta.shape, 2))
+        following[..., 0], following[..., 1] = theta, speed
+        return Outcomes(reward, following, np.zeros(reward.shape, bool))
 
     def table(self, discount: float) -> Table:
         """Returns that of `discounted_value`."""

@@ -121,7 +121,7 @@ def test_results_can_be_compared_and_pickled() -> None:
     scores = [kp.evaluate_policy("reference", 1) for _ in range(2)]
     assert scores[0] == scores[0] != scores[1]
     for agent in ("original", lambda observation: 0.0, kp.q_function(lambda batch: batch)):
-        diagnosis = kp.diagnose(agent)
+        diagnosis = kp.diagnose(agent, gravity=1.0)
         copied = pickle.loads(pickle.dumps(diagnosis))
         assert copied.summary() == diagnosis.summary()
         assert len(copied.figure().axes) == len(diagnosis.figure().axes)

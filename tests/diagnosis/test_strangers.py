@@ -90,7 +90,7 @@ def test_benchmark_uses_its_networks_again(
         return train(Program(steps=210, hidden=(4,), torque_count=3, seed=program.seed), wrap)
 
     monkeypatch.setattr(strangers, "train", short)
-    kinds = ["right", "tanh head", "no random actions", "no replay"]
+    kinds = ["right", "no replay"]
     monkeypatch.setattr(strangers, "KINDS", {"Pendulum-v1": kinds})
     monkeypatch.setattr(
         strangers, "make_program", lambda changes, seed: Program(hidden=(4,), torque_count=3)
@@ -98,15 +98,15 @@ def test_benchmark_uses_its_networks_again(
     written: list[list[dict[str, object]]] = []
     monkeypatch.setattr(strangers, "write", lambda name, command, rows: written.append(rows))
     strangers.main(str(tmp_path), "1", "1")
-    assert len(calls) == 5
+    assert len(calls) == 3
     assert [row["program"] for row in written[0]] == [
         *(*kinds, "all mistakes", "all right programs")
     ]
     strangers.main(str(tmp_path), "1", "1")
-    assert len(calls) == 5 and written[0] == written[1]
+    assert len(calls) == 3 and written[0] == written[1]
     (tmp_path / "strangers.jsonl").unlink()
     strangers.main(str(tmp_path), "1", "1")
-    assert len(calls) == 5 and written[0] == written[2]
+    assert len(calls) == 3 and written[0] == written[2]
 
 
 def test_wrong_answers_are_counted() -> None:
