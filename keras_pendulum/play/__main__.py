@@ -46,7 +46,11 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     )
     add_environment_flag(parser)
     parser.add_argument(
-        "--gravity", type=float, metavar="G", help="gravity in m/s² [recorded in the file, else 1]"
+        "--gravity",
+        type=float,
+        metavar="G",
+        help="gravity in m/s² [recorded in the file, else 10 or 1, where its policy is better; "
+        "without a file 1]",
     )
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the first start [random]")
     weights = parser.add_argument(
@@ -82,7 +86,7 @@ def _play(arguments: argparse.Namespace) -> int:
                 policy = _load_policy(file, arguments.activation)
                 if environment:
                     policy = policy.with_environment(environment)
-                task = policy.task.with_gravity(gravity)
+                task = _task_of(policy, gravity)
             return _run_game(window, check_control_c, task, seed, policy, arguments.print_steps)
         finally:
             window.close()
@@ -95,6 +99,16 @@ def _load_policy(file: Path, activation: str | None) -> Policy:
         from keras_pendulum.evaluate.sources import load_policy
 
     return load_policy(file, activation)
+
+
+def _task_of(policy: Policy, gravity: float | None) -> Task:
+    """Returns the task of a policy, and prints a line where its gravity had to be found."""
+    from keras_pendulum.evaluate.evaluation import find_task
+
+    task, assumption = find_task(policy, gravity)
+    if assumption and gravity is None:
+        print(assumption)
+    return task
 
 
 def _run_game(

@@ -71,6 +71,8 @@ def train_dqn(
     >>> [record.updates for record in result.history], result.finished
     ([0, 0], True)
     """
+    if isinstance(config, str):
+        raise TypeError(f"config is {config!r}; expected Config, such as kp.preset({config!r})")
     require_type("config", config, Config)
     if init is not None:
         require_type("init", init, DQN)

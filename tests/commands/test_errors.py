@@ -58,6 +58,10 @@ def test_wrong_types_are_refused_and_the_error_says_what_is_expected(tmp_path: P
     name: Any = "path"
     wrong: list[tuple[Callable[[], object], str]] = [
         (lambda: kp.train_dqn(none), "config is None; expected Config"),
+        (
+            lambda: kp.train_dqn(name),
+            "config is 'path'; expected Config, such as kp.preset('path')",
+        ),
         (lambda: kp.train_dqn(config, init=name), "init is 'path'; expected DQN"),
         (lambda: kp.save_weights(none, tmp_path / "a.h5"), "network is None; expected DQN"),
         (lambda: kp.save_weights(network, path), "path is b'a.h5'; expected str or PathLike"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import numpy as np
 import pytest
 from browser import Player, shown
@@ -156,8 +157,8 @@ def test_tab_focuses_every_control_in_order_with_an_outline(
 
 def test_score_of_the_last_episode_does_not_stay_beside_another_one(user: Player) -> None:
     first = user.text("score")
-    acts = [lambda: user.press("r"), lambda: user.press("h"), lambda: user.find("hang").click()]
-    for act in acts:
+    hang: Callable[[], object] = user.find("hang").click
+    for act in (lambda: user.press("r"), lambda: user.press("h"), hang):
         user.run("while (!pendulum.page.over) pendulum.step()")
         assert user.text("score").startswith("Score: network ")
         act()

@@ -56,7 +56,7 @@ def test_every_torque_has_a_bar_from_zero_and_a_mark_at_its_exact_value(
 ) -> None:
     player.open_paused(pages["swingup"])
     wait_for(lambda: player.run("return pendulum.page.exact !== null"))
-    exact = player.run(
+    exact: list[float] = player.run(
         "const {page} = pendulum; page.restart(2, 1); page.drive(true); page.choose(1);"
         "return page.exact.qValues([2, 1], page.episode.network.efforts)"
     )
@@ -67,7 +67,7 @@ def test_every_torque_has_a_bar_from_zero_and_a_mark_at_its_exact_value(
     torques = np.linspace(-2, 2, 41)
     table = solution.table(discount)
     expected = solution.exact_q(table, discount, np.array([[2.0, 1.0]]), torques)
-    np.testing.assert_allclose(exact, expected[0], atol=0.05 * np.ptp(table))
+    np.testing.assert_allclose(exact, expected[0], atol=0.05 * float(np.ptp(table)))
 
     path = list(bytes.fromhex(player.run("return pendulum.page.view.colours.path")[1:]))
     for name in ("marks", "bars"):

@@ -434,6 +434,30 @@ def test_gravity_is_the_flag_or_the_recorded_one_or_1(
     assert (task, seed, policy is not None) == (expected, 7, "--against" in words)
 
 
+def test_policy_without_a_recorded_gravity_plays_where_it_is_better(
+    tmp_path: Path,
+    no_window: None,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    played: list[Any] = []
+
+    def record(window: Window, control_c: object, task: Any, *settings: Any) -> int:
+        played.append(task)
+        return 0
+
+    monkeypatch.setattr(play_command, "_run_game", record)
+    shipped = kp.load_weights("swingup")
+    network = kp.DQN(shipped.hidden_units, shipped.action_count, activation=shipped.activation)
+    network.set_weights(shipped.get_weights())
+    kp.save_weights(network, tmp_path / "mine.h5")
+    assert play_command.main(["--against", str(tmp_path / "mine.h5")]) == 0
+    assert "records no gravity" in capsys.readouterr().out
+    assert play_command.main(["--against", str(tmp_path / "mine.h5"), "--gravity", "3"]) == 0
+    assert "records no gravity" not in capsys.readouterr().out
+    assert played == [Pendulum(10.0), Pendulum(3.0)]
+
+
 # Plays in a window that is closed at once.
 PLAY = """
 import sys
