@@ -22,8 +22,8 @@ def steps() -> str:
     label = last.removeprefix("+ ").removesuffix(" = reference")
     rows.append({"one change after the other": label, "regret": arms["reference"]})
     return (
-        f"The main fault is **one update per 200 steps**.\n\n{markdown(rows)}\nBoth tables have the "
-        f"{STATISTIC}, from {table()['rows'][0]['runs']} seeds.\n"
+        f"The main fault is **one update per 200 steps**.\n\n{markdown(rows)}\n"
+        f"Both tables have the {STATISTIC}, from {table()['rows'][0]['runs']} seeds.\n"
     )
 
 
