@@ -94,6 +94,7 @@ COMMANDS = (
     Command("recorded_runs.cartpole", 1, results=("recorded_cartpole",)),
     Command("speed.original_run", 7, results=("original_run",), packages=("psutil",)),
     Command("speed.inner_loops", 1, results=("inner_loops",), packages=("psutil", "torch")),
+    Command("speed.installation", 10, results=("installation",)),
     Command("speed.import_time", 1, results=("import_time",), packages=("psutil",)),
     Command("speed.recorder", 1, results=("recorder",), packages=("psutil",)),
     Command("speed.long_run", 2, results=("long_run",), packages=("psutil",)),

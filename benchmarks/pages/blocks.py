@@ -32,6 +32,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "last regret of swingup": lambda: markdown(rows_of("last_regret_swingup")),
     "shares of the last regret": code_blocks.last_regret_shares,
     "benchmarks": code_blocks.benchmarks,
+    "installation": lambda: markdown(rows_of("installation")),
     "recorded runs": code_blocks.recorded_runs,
     "recorded run of CartPole": lambda: markdown(rows_of("recorded_cartpole")),
     "learning of CartPole": lambda: markdown(rows_of("cartpole_learning")),

@@ -104,16 +104,6 @@ def validate_gravity(gravity: float) -> float:
     return float(gravity) + 0.0  # -0.0 becomes 0.0
 
 
-def require_pendulum(task: Task, what: str, expected: str = "expected Pendulum-v1") -> Pendulum:
-    """Returns the task if it is a pendulum.
-
-    Raises ConfigError for another task. `what` belongs to it, such as a file.
-    """
-    if not isinstance(task, Pendulum):
-        raise ConfigError(f"{what} belongs to {task.environment}; {expected}")
-    return task
-
-
 def pendulum_starts(seeds: Iterable[int]) -> NDArray[np.float64]:
     """Returns the states [N, 2] (θ in rad, θ̇ in rad/s) of `reset(seed=…)` for N seeds."""
     import numpy as np
