@@ -65,11 +65,11 @@ def draw_marked_curve(
 
 
 def draw_legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
-    """Names the curves below the panels, where the legend covers no curve."""
-    lines = [line for axes in panels for line in axes.lines]
+    """Names the curves below the panels, where the legend covers no curve; each name once."""
+    lines = {str(line.get_label()): line for axes in panels for line in axes.lines}
     figure.legend(
-        lines,
-        [str(line.get_label()) for line in lines],
+        list(lines.values()),
+        list(lines),
         loc="outside lower center",
         ncols=columns,
         frameon=False,

@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from keras_pendulum.environments.task import Task
 from keras_pendulum.figures.curves import CurveStyle
+from keras_pendulum.figures.learning_curve import RANDOM
+from keras_pendulum.optimum.solutions import solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,6 +58,13 @@ def draw_regrets(axes: Axes, rows: Sequence[RegretRow], label: str, title: str) 
     axes.grid(axis="x", color="0.9")
     axes.set_axisbelow(True)
     axes.set(xlabel=label, title=title)
+
+
+def draw_random_regret(axes: Axes, task: Task) -> None:
+    """Draws a dotted line at the regret of random actions in whole episodes."""
+    exact = solution(task)
+    regret = exact.mean_best_return(task.steps_per_episode) - exact.random_return()
+    axes.axhline(regret, color="0.3", linestyle=":", linewidth=1.5, label=RANDOM)
 
 
 def scale_greedy_regrets(axes: Axes) -> None:

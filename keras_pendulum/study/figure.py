@@ -13,7 +13,12 @@ from keras_pendulum.figures.curves import (
     draw_legend_below,
     draw_marked_curve,
 )
-from keras_pendulum.figures.regrets import RegretRow, draw_regrets, scale_greedy_regrets
+from keras_pendulum.figures.regrets import (
+    RegretRow,
+    draw_random_regret,
+    draw_regrets,
+    scale_greedy_regrets,
+)
 from keras_pendulum.figures.style import own_style, plain_text, png
 from keras_pendulum.study.job import RunResult, evaluate_every
 from keras_pendulum.study.statistics import curve_band
@@ -22,13 +27,14 @@ from keras_pendulum.study.table import Row
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_MOST_BANDS = 3  # in a panel; more curves have an interval at their end only
 _STYLE_WITHOUT_CURVE: CurveStyle = ("0.45", "-", "o")
 
 
 def draw_study(rows: Sequence[Row], results: Mapping[str, Sequence[RunResult]]) -> bytes:
     """Draws the arms' regrets on the left, and their curves on the right, a panel for each task.
 
-    A curve is the greedy regret over the episodes.
+    A curve is the greedy regret over the episodes. A dotted line is that of random actions.
 
     Args:
         rows: at least one, from top to bottom.
@@ -92,8 +98,13 @@ def _draw_curves(
         style = styles[row.arm.name]
         label = plain_text(row.arm.label or row.arm.name, letters=80)
         draw_marked_curve(axes, episodes, middle, style, index / len(rows), label)
-        axes.fill_between(episodes, low, high, color=style[0], alpha=0.15, linewidth=0)
+        if len(rows) <= _MOST_BANDS:
+            axes.fill_between(episodes, low, high, color=style[0], alpha=0.15, linewidth=0)
+        else:  # beside each other, behind the last evaluation
+            end = episodes[-1] * (1.02 + 0.06 * index / len(rows))
+            axes.vlines(end, low[-1], high[-1], color=style[0], linewidth=2.5)
     scale_greedy_regrets(axes)
+    draw_random_regret(axes, rows[0].arm.config.task)
     axes.set(
         xlabel="Episode",
         ylabel="Greedy regret (return below the best possible)",

@@ -8,6 +8,7 @@ from figure_texts import figure_of, require_legible
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from keras_pendulum.figures.learning_curve import RANDOM
 from keras_pendulum.study.arms import Arm, default_arms, own_arms
 from keras_pendulum.study.figure import draw_study
 from keras_pendulum.study.job import RunResult
@@ -29,7 +30,9 @@ def drawn(arms: list[Arm], seeds: int = 1) -> Figure:
 def panels(figure: Figure) -> dict[str, dict[str, Line2D]]:
     """Returns the curves by task and arm."""
     return {
-        axes.get_title().split(":")[0]: {str(line.get_label()): line for line in axes.lines}
+        axes.get_title().split(":")[0]: {
+            name: line for line in axes.lines if (name := str(line.get_label())) != RANDOM
+        }
         for axes in figure.axes[1:]
     }
 
@@ -50,6 +53,16 @@ def test_each_arm_draws_its_own_curve() -> None:
     # The reference is evaluated after every 50 of its 500 episodes.
     line = panels(figure)["Pendulum-v1, g = 1"]["reference"]
     assert np.asarray(line.get_xdata()).tolist() == [50, 100]
+
+
+def test_random_actions_are_a_line_and_many_curves_have_no_bands() -> None:
+    for count, bands in ((3, 3), (4, 0)):
+        axes = drawn(own_arms([], [f"arm{n}: reference" for n in range(count)])).axes[1]
+        (line,) = [each for each in axes.lines if each.get_label() == RANDOM]
+        assert np.asarray(line.get_ydata())[0] == pytest.approx(884, abs=5)
+        kinds = [type(each).__name__ for each in axes.collections]
+        assert kinds.count("FillBetweenPolyCollection") == bands
+        assert kinds.count("LineCollection") == (0 if bands else count)
 
 
 def test_more_arms_than_colours_have_different_curves() -> None:
