@@ -30,7 +30,7 @@ BATCH = 128  # transitions
 CAPACITY = 50_000  # [5] transitions
 COPY_EVERY = 50  # updates
 LEARNING_RATE = 1e-3  # [6] at the start
-EPSILON = (1.0, 0.05)  # at the start, and from the middle of the run on
+EPSILON = (1.0, 0.05 if PENDULUM else 0.2)  # at the start, and from the middle of the run on
 
 
 def make_network(size):
