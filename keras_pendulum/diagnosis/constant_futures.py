@@ -102,7 +102,8 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
             "batch-max": mean > 2 * size and spread < 0.12 * mean and end < 0.5 * mean,
         }
         name = equation.variant or equation.name
-        equation = replace(equation, offset=offsets[name], largest_error=1.6)
+        share = max(equation.share, 0.6)
+        equation = replace(equation, offset=offsets[name], largest_error=1.6, share=share)
         yield _highest_everywhere(equation) if name == "batch-max" else equation
     lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
     yield replace(

@@ -14,6 +14,8 @@ from keras_pendulum.diagnosis.measurement import Measurement
 
 _RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _GROWN = 3.0  # spreads above the best possible value
+_UNRELATED = 0.5  # error of the right equation
+_SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
 _DIVERGED = 20.0  # spreads above the best possible value: no equation has this fixed point
 _HEALTHY = f"{RIGHT} to 1 to 7 %"
 
@@ -78,6 +80,30 @@ def growth_beyond_ends(m: Measurement) -> Finding | None:
             )
             return Finding("missing-end", evidence, _HEALTHY)
     return None
+
+
+def growth_everywhere(m: Measurement) -> Finding | None:
+    """Finds values that grew without bound, but are nearly the same in all states.
+
+    Other values that grow differ from state to state, and each follows those of its next states.
+    """
+    if m.task.never_terminates or not m.finite or m.excess < _GROWN:
+        return None
+    values, error = m.backup.offset, m.right_agreement.error
+    at_ends = float(m.backup.q[~m.backup.continues].mean()) if not m.backup.continues.all() else 0.0
+    mean, spread = float(values.mean()), float(values.std())
+    if error < _UNRELATED or spread > _SAME * mean or at_ends > 0.85 * mean:
+        return None
+    evidence = (
+        f"values of {mean:.2g} that differ by {_percent(spread / mean)} from state to state, where "
+        f"the episode goes on; they satisfy {RIGHT} to {_percent(error)}"
+    )
+    text = Fault(
+        "The target takes one maximum for the whole batch, so the best state of the batch follows "
+        "on every state. Its error grows with each copy of the target network.",
+        "Give the maximum its axis: max(axis=1) of [B, A] is [B].",
+    )
+    return Finding("wrong-target", evidence, _HEALTHY, variant="batch-max", text=text)
 
 
 def not_converged(m: Measurement) -> Finding | None:

@@ -22,6 +22,7 @@ from keras_pendulum.diagnosis.measurement import Measurement
 
 RULES: tuple[Callable[[Measurement], Finding | None], ...] = (
     equation_rules.growth_beyond_ends,
+    equation_rules.growth_everywhere,
     output_rules.not_finite,
     transition_rules.stored_transitions,
     run_rules.old_state,

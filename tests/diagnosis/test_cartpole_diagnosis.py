@@ -46,14 +46,24 @@ def values_with_zeros(observations: Any) -> Any:
     return shares * (1 + 0.95 * np.stack([value(following[:, i]) for i in range(2)], axis=1))
 
 
-def constant_values(future: float) -> Any:
-    """Returns a function of Q-values [B, 2]: 1 at an end, else 1 and about the same future."""
+def constant_values(future: float, at_end: float = 0.0) -> Any:
+    """Returns a function of Q-values [B, 2]: about the same future in all states.
+
+    Where a step ends the episode, the value is 1 and a share of the future.
+    """
 
     def values(observations: Any) -> Any:
         ended = step_forces(EXACT.states_of(observations), FORCES).terminated
-        return 1 + np.where(ended, 0, future * (1 + 0.05 * np.sin(20 * observations[:, :2])))
+        other = 1 + 0.05 * np.sin(2000 * observations[:, :2])
+        return 1 + future * np.where(ended, at_end, other)
 
     return values
+
+
+def frozen_values(observations: Any) -> Any:
+    """Returns Q-values [B, 2]: the reward and a little that is linear in the next state."""
+    outcomes = step_forces(EXACT.states_of(observations), FORCES)
+    return 1 + np.where(outcomes.terminated, 0, 0.1 + 0.05 * outcomes.state.sum(axis=2))
 
 
 def first(values: Any, **options: Any) -> str:
@@ -71,11 +81,12 @@ def first(values: Any, **options: Any) -> str:
         ("missing-end", lambda o: 20 + 0.001 * np.sin(o[:, :2])),
         ("missing-end", lambda o: 2e7 + 3e8 * o[:, [2, 2]] ** 2),
         ("overestimation", lambda o: 2e7 * np.cos(6 * o[:, 2:3]) + 1e6 * o[:, :2]),
+        ("wrong-target (batch-max)", constant_values(3e4, at_end=0.7)),
         ("no-bootstrapping", lambda o: 1 + 0.001 * np.sin(o[:, :2])),
         ("wrong-loss (batch-broadcast)", lambda o: 9 + 0.001 * np.sin(o[:, :2])),
         ("wrong-target (batch-max or same-state)", constant_values(18.0)),
         ("wrong-target (index-for-value)", constant_values(0.8)),
-        ("wrong-target (frozen-target)", lambda o: 1.1 + 0.05 * o[:, 2:] + 0.05 * o[:, :2]),
+        ("wrong-target (frozen-target)", frozen_values),
         ("wrong-loss (zero-others)", values_with_zeros),
         ("broken-network", lambda o: np.full((len(o), 2), np.nan)),
     ],
