@@ -10,20 +10,22 @@ from keras_pendulum.study.arms import default_arms, describe_setting
 
 
 def steps() -> str:
-    """Returns the regrets of the study's arms from `original` to `reference`."""
+    """Returns the regrets of the study's arms from `original` to `reference`, in one paragraph."""
     arms = {arm["arm"]: number(arm["regret_iqm"]) for arm in table()["rows"]}
-    rows = [{"one change after the other": "the original", "regret": arms["original"]}]
+    changes = []
     for name, regret in arms.items():
         setting, equals, value = name.removeprefix("+ ").partition("=")
         if name.startswith("+ ") and equals:
             label = describe_setting(setting, int(value) if value.isdecimal() else value)
-            rows.append({"one change after the other": label, "regret": regret})
+            changes.append(f"{regret} ({label})")
     (last,) = [arm.label for arm in default_arms() if arm.name == "reference"]
     label = last.removeprefix("+ ").removesuffix(" = reference")
-    rows.append({"one change after the other": label, "regret": arms["reference"]})
+    changes.append(f"{arms['reference']} ({label})")
     return (
-        f"The main fault is **one update per 200 steps**.\n\n{markdown(rows)}\n"
-        f"Both tables have the {STATISTIC}, from {table()['rows'][0]['runs']} seeds.\n"
+        "The main fault is **one update per 200 steps**. Here and in the table, the regret of a "
+        f"program is the {STATISTIC}. It is {arms['original']} for the original, from "
+        f"{table()['rows'][0]['runs']} seeds. With one change after the other it is "
+        f"{', '.join(changes[:-1])} and {changes[-1]}.\n"
     )
 
 
