@@ -31,7 +31,7 @@ RUNS: dict[str, tuple[str, str]] = {
     "no target network": ("COPY_EVERY = 50", "COPY_EVERY = 1"),
     "small replay buffer": ("CAPACITY = 50_000", "CAPACITY = 500"),
     "few updates": ("UPDATE_EVERY = 2 ", "UPDATE_EVERY = 100 "),
-    "ε stays at 1": ("EPSILON = (1.0, 0.05)", "EPSILON = (1.0, 1.0)"),
+    "ε stays at 1": ("EPSILON = (1.0, 0.05 if", "EPSILON = (1.0, 1.0 if"),
 }
 # The lines that log, and those that they replace.
 LOGGING = (
