@@ -36,8 +36,3 @@ def in_notebook() -> bool:
     ipython = sys.modules.get("IPython")
     shell = ipython.get_ipython() if ipython is not None else None
     return shell is not None and hasattr(shell, "kernel")
-
-
-def draw_without_display() -> None:
-    """Makes SDL draw images without a display; its search for one prints errors."""
-    os.environ.setdefault("SDL_VIDEODRIVER", "dummy")

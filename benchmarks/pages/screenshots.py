@@ -64,7 +64,7 @@ def draw_game() -> None:
     import keras_pendulum as kp
     from keras_pendulum.environments.pendulum import Pendulum
     from keras_pendulum.play.game import Game, Key
-    from keras_pendulum.play.played_tasks import played_task
+    from keras_pendulum.play.played_task import played_task
     from keras_pendulum.play.window import Window
 
     window = Window(wait_for_frame=lambda: None)

@@ -80,12 +80,6 @@ class Pendulum(Task):
         """Returns the reward per step."""
         return episode_return / steps
 
-    def torque_of(self, action: Any) -> float:
-        """Returns the torque in N·m."""
-        import numpy as np
-
-        return float(np.reshape(action, -1)[0])
-
     def reset_to_angle(self, env: gymnasium.Env[Any, Any], angle: float) -> NDArray[np.float32]:
         """Sets the pendulum to rest at an angle in degrees; returns the observation [3]."""
         import numpy as np

@@ -74,10 +74,6 @@ class Task(ABC):
         """Returns the return of an episode of so many steps as learning curves show it."""
         return episode_return
 
-    def torque_of(self, action: Any) -> float | None:
-        """Returns the torque of an action in N·m; None where actions are not torques."""
-        return None
-
     def reset_to_angle(self, env: gymnasium.Env[Any, Any], angle: float) -> Any:
         """Sets an environment to rest at an angle, and returns the observation [D].
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import nonempty_path, require_ending
-from keras_pendulum.display import draw_without_display
 from keras_pendulum.errors import UserError, one_line
 from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
@@ -27,6 +26,8 @@ if TYPE_CHECKING:
 
 _STARTS = {"hanging": 180.0, "upright": 0.0}  # angles in degrees
 _GIF_SECONDS = 0.1  # of a frame; many programs show shorter ones too slowly
+_GIF_COLORS = 64
+_GIF_SAMPLE = 10  # pictures that the colours are taken from
 
 
 def add_film_flags(parser: argparse.ArgumentParser) -> None:
@@ -90,7 +91,6 @@ def make_films(arguments: argparse.Namespace, policy: Policy, task: Task, name: 
         start = f"start: {names.get(angle, f'{angle:g}°')}"
     _, *physics = task.name.split(", ")
     title = ", ".join([name, *(f"{each} m/s²" for each in physics)])
-    draw_without_display()
     with status("Drawing the film"):
         pictures = list(film_episode(policy, task, (title, start), seed, angle))
     if arguments.gif:
@@ -106,13 +106,22 @@ def make_films(arguments: argparse.Namespace, policy: Policy, task: Task, name: 
 
 
 def encode_gif(pictures: Sequence[Image]) -> bytes:
-    """Returns a looping GIF."""
+    """Returns a looping GIF. Its pictures share one palette, which makes the file smaller."""
+    from PIL import Image
+
+    width, height = pictures[0].size
+    some = pictures[:: max(1, len(pictures) // _GIF_SAMPLE)]
+    sample = Image.new("RGB", (width, height * len(some)))
+    for i, picture in enumerate(some):
+        sample.paste(picture, (0, height * i))
+    palette = sample.quantize(_GIF_COLORS, dither=Image.Dither.NONE)
+    first, *others = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures)
     stream = io.BytesIO()
-    pictures[0].save(
+    first.save(
         stream,
         format="GIF",
         save_all=True,
-        append_images=pictures[1:],
+        append_images=others,
         duration=round(1000 * _GIF_SECONDS),
         loop=0,
     )

@@ -121,7 +121,7 @@ def _run_game(
 ) -> int:
     from keras_pendulum.optimum.solution import USUAL_SEEDS
     from keras_pendulum.play.game import Game
-    from keras_pendulum.play.played_tasks import played_task
+    from keras_pendulum.play.played_task import played_task
     from keras_pendulum.play.window import play
 
     if seed is None:

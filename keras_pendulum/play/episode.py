@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import gymnasium
 
-    from keras_pendulum.play.played_task import Observation, PlayedTask
+    from keras_pendulum.figures.scene import Observation
+    from keras_pendulum.play.played_task import PlayedTask
 
 
 class ManualEpisode:
@@ -21,7 +22,7 @@ class ManualEpisode:
         self.reward = 0.0  # of the last step
         self.total_reward = 0.0  # the undiscounted return so far
         self.done = False
-        self.path = [task.state(self.observation)]  # of the phase plane, from the start on
+        self.path = [task.scene.state(self.observation)]  # of the phase plane, from the start on
 
     def step(self, effort: float) -> None:
         """Takes one step. Raises ValueError for an impossible effort."""
@@ -30,11 +31,11 @@ class ManualEpisode:
         self.effort, self.reward = effort, float(reward)
         self.total_reward += self.reward
         self.steps += 1
-        self.path.append(self._task.state(self.observation))
+        self.path.append(self._task.scene.state(self.observation))
         self.done = terminated or truncated
 
     def __str__(self) -> str:
         return (
-            f"Step: {self.steps}, {self._task.effort.capitalize()}: {self.effort:g}, "
+            f"Step: {self.steps}, {self._task.scene.effort.capitalize()}: {self.effort:g}, "
             f"Reward: {self.reward:.3f}, Return: {self.total_reward:.3f}"
         )

@@ -6,15 +6,16 @@ frame, and draws its `view`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
 from keras_pendulum.evaluate.policy import Policy
+from keras_pendulum.figures.moment import Moment
 from keras_pendulum.optimum.solution import USUAL_SEEDS
 from keras_pendulum.optimum.solutions import solution
 from keras_pendulum.play.episode import ManualEpisode
-from keras_pendulum.play.played_task import Observation, PlayedTask
+from keras_pendulum.play.played_task import PlayedTask
 
 FRAMES_PER_SECOND = 20  # each is a step: of 0.05 s for the pendulum
 READY_FRAMES = 2 * FRAMES_PER_SECOND  # the player sees the start before anything moves
@@ -42,16 +43,9 @@ class View:
     task: PlayedTask
     held: bool  # whether a key acts only while it is held
     seed: int
-    observation: Observation  # [D]
-    effort: float  # of the last step
-    step: int
-    reward: float  # of the last step
-    total_reward: float  # the return so far
-    optimal_return: float
+    moment: Moment
     message: str  # over the picture; empty while an episode runs
     key_help: str
-    path: Sequence[tuple[float, float]]  # θ (rad) and θ̇ (rad/s) so far; the last one is present
-    earlier_path: Sequence[tuple[float, float]]  # the player's, while the agent drives
 
 
 class _Stage(Enum):
@@ -102,7 +96,7 @@ class Game:
     ) -> None:
         self._task, self._policy, self._print_line = task, policy, print_line
         self._print_steps = print_steps
-        right = task.rightward
+        right = task.scene.rightward
         self._directions = {Key.NEGATIVE: -1, Key.POSITIVE: 1, Key.NEUTRAL: 0}
         self._directions |= {Key.LEFT: -right, Key.RIGHT: right}
         self._env = task.task.make_env()
@@ -157,16 +151,19 @@ class Game:
             task=self._task,
             held=self._held,
             seed=self._seed,
-            observation=episode.observation,
-            effort=episode.effort,
-            step=episode.steps,
-            reward=episode.reward,
-            total_reward=episode.total_reward,
-            optimal_return=self._optimal_return,
+            moment=Moment(
+                observation=episode.observation,
+                effort=episode.effort,
+                step=episode.steps,
+                steps=self._task.task.steps_per_episode,
+                reward=episode.reward,
+                total_reward=episode.total_reward,
+                optimal_return=self._optimal_return,
+                path=episode.path,
+                earlier_path=() if episode is self._player else self._player.path,
+            ),
             message=message,
             key_help=_KEY_HELP[self._stage],
-            path=episode.path,
-            earlier_path=() if episode is self._player else self._player.path,
         )
 
     def close(self) -> None:
@@ -204,7 +201,7 @@ class Game:
     def _step_agent(self) -> None:
         assert self._policy is not None
         action = self._policy.action(self._episode.observation)
-        self._episode.step(self._task.effort_of_action(action))
+        self._episode.step(self._task.scene.effort_of_action(action))
         if self._episode.done:
             self._show_score()
 
@@ -219,7 +216,7 @@ class Game:
 
     def _score(self) -> str:
         """Returns the returns of the finished episodes, or the player's return so far."""
-        show = self._task.show_return
+        show = self._task.scene.show_return
         player = f"you {show(self._player.total_reward)}"
         if not self._player.done:
             steps = self._task.task.steps_per_episode

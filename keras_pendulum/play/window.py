@@ -8,17 +8,8 @@ from collections.abc import Callable
 import pygame
 
 from keras_pendulum.errors import UserError
-from keras_pendulum.figures.style import rgb, torque_color
-from keras_pendulum.play.drawing import (
-    INK,
-    LARGE,
-    LINE,
-    PALE_INK,
-    PAPER,
-    WHITE,
-    Writer,
-    draw_portrait,
-)
+from keras_pendulum.figures.drawing import LARGE, PAPER, Writer
+from keras_pendulum.figures.moment import BELOW, draw_moment
 from keras_pendulum.play.game import FRAMES_PER_SECOND, Game, Key, View
 
 KEYS = {
@@ -39,9 +30,7 @@ KEYS = {
 
 _SIZE = _WIDTH, _HEIGHT = 1000, 640
 _TOP = 48  # height of the title
-_SIDE = 456  # of the picture, and of the phase portrait beside it
-_LEFT, _RIGHT = pygame.Rect(0, _TOP, 500, _SIDE), pygame.Rect(500, _TOP, 500, _SIDE)
-_BAR = pygame.Rect(110, _TOP + _SIDE + 16, 280, 18)  # the effort, below the picture
+_MOMENT = pygame.Rect(0, _TOP, _WIDTH, 456 + BELOW)
 
 
 class Window:
@@ -98,48 +87,13 @@ class Window:
         self._write(f"a key acts {acts} (h: switch)", (_WIDTH // 2 - 90, 16), align=0.5)
         start = f"{view.task.setting}      start of seed {view.seed}"
         self._write(start, (_WIDTH - 16, 16), align=1.0)
-        pygame.draw.rect(self._screen, WHITE, (0, _TOP, _WIDTH, _SIDE))
-        self._screen.blit(view.task.draw(view.observation, view.effort, _LEFT.size), _LEFT)
-        draw_portrait(self._screen, self._write, _RIGHT, view.task, view.path, view.earlier_path)
-        # A strip along the lower edge shows the elapsed share of the episode.
-        width = _WIDTH * view.step // view.task.task.steps_per_episode
-        pygame.draw.rect(self._screen, LINE, (0, _TOP + _SIDE - 4, width, 4))
+        draw_moment(self._screen, self._write, _MOMENT, view.task.scene, view.moment)
         if view.message:
-            self._write(view.message, (_LEFT.centerx, _TOP + 6), align=0.5)
-        self._draw_effort(view)
-        self._draw_numbers(view)
+            self._write(view.message, (_WIDTH // 4, _TOP + 6), align=0.5)
         self._write(view.task.keys, (16, _HEIGHT - 30))
         self._write(view.key_help, (_WIDTH - 16, _HEIGHT - 30), align=1.0)
         pygame.display.flip()
         self._wait_for_frame()
-
-    def _draw_effort(self, view: View) -> None:
-        """Draws a bar from the middle; a positive effort points to the right."""
-        pygame.draw.rect(self._screen, WHITE, _BAR)
-        length = round(abs(view.effort) / view.task.largest_effort * _BAR.width / 2)
-        left = _BAR.centerx - (length if view.effort < 0 else 0)
-        place = (left, _BAR.top, length, _BAR.height)
-        pygame.draw.rect(self._screen, rgb(torque_color(view.effort)), place)
-        pygame.draw.rect(self._screen, LINE, _BAR, width=1)
-        pygame.draw.line(self._screen, INK, _BAR.midtop, _BAR.midbottom, width=2)
-        negative, positive = view.task.directions
-        self._write(negative, (_BAR.left - 10, _BAR.top), align=1.0)
-        self._write(positive, (_BAR.right + 10, _BAR.top))
-
-    def _draw_numbers(self, view: View) -> None:
-        task = view.task
-        numbers = {
-            task.effort: f"{view.effort:+.1f} {task.unit}" if view.effort else f"0 {task.unit}",
-            "step": f"{view.step} of {task.task.steps_per_episode}",
-            "reward": f"{view.reward:z.3f}",
-            "return": task.show_return(view.total_reward),
-            "best possible": task.show_return(view.optimal_return),
-        }
-        width = _WIDTH / len(numbers)
-        for i, (name, text) in enumerate(numbers.items()):
-            middle = round((i + 0.5) * width)
-            self._write(name, (middle, _BAR.bottom + 16), align=0.5, color=PALE_INK)
-            self._write(text, (middle, _BAR.bottom + 35), LARGE, align=0.5)
 
 
 def play(game: Game, window: Window, check_interrupt: Callable[[], None]) -> None:

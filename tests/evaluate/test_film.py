@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import io
 import math
 import shutil
@@ -11,21 +12,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pygame
 import pytest
-from PIL import Image, ImageDraw
+from PIL import Image
 
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.evaluate import film, film_command
-from keras_pendulum.evaluate.film import Moment, draw_frame
+from keras_pendulum.evaluate.film import SIZE, draw_frame
+from keras_pendulum.figures.drawing import INK, SMALL, Writer
+from keras_pendulum.figures.moment import Moment
+from keras_pendulum.figures.scenes import SCENES, scene
 from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
 
 pytestmark = pytest.mark.quick
 
 TITLES = ("swingup, g = 10 m/s²", "start: hanging")
-SCENE = np.full((500, 500, 3), 255, np.uint8)
+HANGING, CART = np.array([-1, 0, 0], np.float32), np.array([0.1, 0, 0.02, 0], np.float32)
 
 
 def test_start_is_a_name_or_an_angle() -> None:
@@ -61,11 +67,11 @@ def test_optimum_of_a_film_is_that_of_its_seed_or_angle(monkeypatch: pytest.Monk
         return np.array([-7.0])
 
     monkeypatch.setattr("keras_pendulum.optimum.best_return.best_return", best_return)
-    monkeypatch.setattr(film, "draw_frame", lambda pixels, moment: moment)
+    monkeypatch.setattr(film, "draw_frame", lambda *given: given[-1])
 
     def optimum(task: Task, name: str, angle: float | None = None) -> Any:
         moment: Any = next(film.film_episode(kp.load_policy(name), task, ("", ""), 3, angle))
-        return moment.optimum
+        return moment.optimal_return
 
     assert optimum(Pendulum(), "reference") == kp.optimal_return(1.0, [3])[0]
     assert optimum(CartPole(), "cartpole") == 500
@@ -79,8 +85,13 @@ def test_film_shows_each_step_with_the_return_of_the_evaluation(
 ) -> None:
     moments: list[Moment] = []
 
-    def record(pixels: Any, moment: Moment) -> Image.Image:
-        moments.append(moment)
+    titles: list[tuple[str, str]] = []
+
+    def record(
+        writer: Any, drawn: Any, titles_of_frame: tuple[str, str], moment: Moment
+    ) -> Image.Image:
+        moments.append(dataclasses.replace(moment, path=list(moment.path)))
+        titles.append(titles_of_frame)
         return Image.new("RGB", (2, 2), (moment.step, 0, 0))
 
     monkeypatch.setattr(film, "draw_frame", record)
@@ -96,11 +107,12 @@ def test_film_shows_each_step_with_the_return_of_the_evaluation(
     film_command.make_films(arguments, policy, Pendulum(), "mine")
     score = kp.evaluate_policy(policy, 1, seed=5)
     assert [moment.step for moment in moments] == list(range(201))
-    assert moments[0].titles == ("mine, g = 1 m/s²", "start of seed 5")
-    assert moments[-1].total == pytest.approx(score.mean_return)
-    assert moments[-1].optimum == score.optimal_mean_return
+    assert set(titles) == {("mine, g = 1 m/s²", "start of seed 5")}
+    assert moments[-1].total_reward == pytest.approx(score.mean_return)
+    assert moments[-1].optimal_return == score.optimal_mean_return
     first = policy(np.asarray(Pendulum().make_env().reset(seed=5)[0]))
-    assert moments[1].torque == first[0]
+    assert [moment.effort for moment in moments[:2]] == [0, first[0]]
+    assert [len(moment.path) for moment in moments] == list(range(1, 202))
     # A GIF shows each second step, and the last one.
     assert shown == list(range(0, 201, 2))
 
@@ -120,53 +132,102 @@ def test_film_names_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
     assert titles == [("swingup, g = 10 m/s²", start) for start in starts]
 
 
-def test_frame_is_cropped_and_shows_the_torque() -> None:
-    scene = SCENE.copy()
-    scene[:110] = scene[-110:] = 0  # outside the circle of the rod
-    bars = []
-    for torque in (-2.0, 2.0):
-        moment = Moment(TITLES, step=7, steps=200, torque=torque, total=-276.5, optimum=-295.6)
-        picture = draw_frame(scene, moment)
-        assert picture.size == (320, 448)
-        assert picture.getpixel((160, 50)) == (255, 255, 255)
-        row = 44 + 320 + 18
-        bars.append([picture.getpixel((x, row)) for x in (200, 270)])
+def frame(task: Task, observation: Any, effort: float, titles: Any = TITLES, **numbers: Any) -> Any:
+    drawn = scene(task)
+    given: dict[str, Any] = {"step": 7, "steps": 200, "reward": -1.0, "total_reward": -276.5}
+    given |= {"optimal_return": -295.6, "path": [drawn.state(observation)]} | numbers
+    moment = Moment(observation=observation, effort=effort, **given)
+    return draw_frame(Writer(pygame.Surface(SIZE)), drawn, titles, moment)
+
+
+def test_every_task_can_be_filmed() -> None:
+    assert SCENES.keys() == TASKS.keys()
+
+
+def test_task_without_drawings_is_refused() -> None:
+    class Other(Pendulum):
+        environment = "Other-v1"
+
+    with pytest.raises(kp.ConfigError, match="Other-v1 cannot be drawn; these can: Pendulum-v1"):
+        next(film.film_episode(kp.load_policy("reference"), Other(), ("", ""), 0, None))
+
+
+def test_frame_shows_the_effort_as_a_bar() -> None:
     white = (255, 255, 255)
-    assert bars == [[rgb(CLOCKWISE), white], [white, rgb(COUNTERCLOCKWISE)]]
+    for task, state, most in ((Pendulum(), HANGING, 2.0), (CartPole(), CART, 10.0)):
+        bars = []
+        for effort in (-most, most):
+            picture = frame(task, state, effort)
+            assert picture.size == SIZE
+            bars.append([picture.getpixel((x, 433)) for x in (150, 250)])
+        assert bars == [[rgb(CLOCKWISE), white], [white, rgb(COUNTERCLOCKWISE)]]
 
 
-@pytest.mark.parametrize("torque", [-2.0, None])
+def test_torque_beyond_the_largest_stays_in_its_bar() -> None:
+    pixels = np.asarray(frame(Pendulum(), HANGING, -9.0))
+    assert (pixels == np.asarray(frame(Pendulum(), HANGING, -2.0)))[420:440, :88].all()
+
+
+def test_frame_shows_the_path() -> None:
+    line = [(-1.0, 0.0), (-0.5, 4.0), (0.5, 4.0)]
+    one, other = (
+        np.asarray(frame(Pendulum(), HANGING, 0.0, path=path)).astype(int)
+        for path in (line, [line[-1]])
+    )
+    changed = np.argwhere((one != other).any(axis=2))
+    assert len(changed) and changed[:, 1].min() > 400 and changed[:, 0].max() < 408
+
+
+def test_edges_of_the_drawing_are_smooth() -> None:
+    # Between the red of the rod and the white there are pixels of neither.
+    observation = np.array([math.cos(0.3), math.sin(0.3), 0], np.float32)
+    scene_pixels = np.asarray(frame(Pendulum(), observation, 0.0))[60:400, 60:340]
+    assert len(np.unique(scene_pixels.reshape(-1, 3), axis=0)) > 8
+
+
+@pytest.mark.parametrize(
+    ("task", "state", "numbers"),
+    [
+        (Pendulum(100.0), HANGING, {"total_reward": -3255.1, "optimal_return": -1758.3}),
+        (CartPole(), CART, {"steps": 500, "total_reward": 500.0, "optimal_return": 500.0}),
+    ],
+    ids=["pendulum", "cartpole"],
+)
 def test_texts_of_a_frame_do_not_overlap_and_are_inside(
-    torque: float | None, monkeypatch: pytest.MonkeyPatch
+    task: Task, state: Any, numbers: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    boxes: list[tuple[float, float, float, float]] = []
-    draw_text = ImageDraw.ImageDraw.text
+    boxes: list[pygame.Rect] = []
+    write = Writer.write
 
-    def record(self: Any, xy: Any, text: str, fill: Any, font: Any, anchor: str = "la") -> None:
-        boxes.append(self.textbbox(xy, text, font=font, anchor=anchor))
-        draw_text(self, xy, text, fill, font, anchor=anchor)
+    def record(
+        self: Writer, text: str, place: tuple[int, int], *options: Any, **named: Any
+    ) -> None:
+        write(self, text, place, *options, **named)
+        drawn = self._render(text, (*options, SMALL)[0], named.get("color", INK))
+        left = place[0] - round(named.get("align", 0.0) * drawn.get_width())
+        boxes.append(drawn.get_rect(topleft=(left, place[1])))
 
-    monkeypatch.setattr(ImageDraw.ImageDraw, "text", record)
-    titles = ("pendulum_weight, g = 100 m/s²", "start of seed 4294967295")
-    moment = Moment(titles, step=200, steps=200, torque=torque, total=-3255.1, optimum=-1758.3)
-    picture = draw_frame(SCENE, moment)
-    assert len(boxes) == (11 if torque is not None else 7)
-    for i, (left, top, right, bottom) in enumerate(boxes):
-        assert left >= 0 and top >= 0 and right <= picture.width and bottom <= picture.height
-        for other in boxes[:i]:
-            apart = right <= other[0] or left >= other[2] or bottom <= other[1] or top >= other[3]
-            assert apart, (boxes[i], other)
+    monkeypatch.setattr(Writer, "write", record)
+    effort = -scene(task).largest_effort
+    titles = ("a_longer_name_of_a_file, g = 100 m/s²", "start of seed 4294967295")
+    frame(task, state, effort, titles=titles, step=200, reward=-16.274, **numbers)
+    assert len(boxes) == 23
+    for i, box in enumerate(boxes):
+        assert pygame.Rect((0, 0), SIZE).contains(box), box
+        # Each line has some empty pixels above and below its letters.
+        assert box.inflate(0, -6).collidelist([b.inflate(0, -6) for b in boxes[:i]]) == -1
 
 
 def test_numbers_of_a_frame_have_no_negative_zero(monkeypatch: pytest.MonkeyPatch) -> None:
     texts: list[str] = []
-    monkeypatch.setattr(ImageDraw.ImageDraw, "text", lambda *words, **_: texts.append(words[2]))
+    monkeypatch.setattr(Writer, "write", lambda self, text, *_, **__: texts.append(text))
     for torque in (-0.01, 0.01):
-        draw_frame(SCENE, Moment(TITLES, 1, 200, torque=torque, total=-0.04, optimum=-0.001))
-        assert texts.count("0.0 N·m") == 1
+        numbers = {"reward": -0.0001, "total_reward": -0.04, "optimal_return": -0.001}
+        frame(Pendulum(), HANGING, torque, **numbers)
+        assert {"0.0 N·m", "0.000"} <= set(texts)
         assert texts.count("0.0") == 2
         texts.clear()
-    draw_frame(SCENE, Moment(TITLES, 1, 200, torque=-2.0, total=-9.96, optimum=0.0))
+    frame(Pendulum(), HANGING, -2.0, total_reward=-9.96)
     assert {"−2.0 N·m", "−10.0"} <= set(texts)
 
 
@@ -200,5 +261,5 @@ def test_ffmpeg_gets_the_pictures_and_its_failure_is_one_line(tmp_path: Path) ->
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
 def test_video_is_an_mp4() -> None:
-    pictures = [Image.new("RGB", (320, 448), color) for color in ("red", "blue")]
+    pictures = [Image.new("RGB", SIZE, color) for color in ("red", "blue")]
     assert film_command.encode_mp4(film_command.find_ffmpeg(), pictures, 0.05)[4:8] == b"ftyp"

@@ -26,16 +26,17 @@ from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.evaluate import __main__ as evaluate_command
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.sources import as_policy
+from keras_pendulum.figures import drawing
+from keras_pendulum.figures.drawing import INK, SMALL, Writer
+from keras_pendulum.figures.moment import draw_portrait
+from keras_pendulum.figures.pendulum_scene import draw_pendulum
+from keras_pendulum.figures.scenes import scene
 from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
 from keras_pendulum.play import __main__ as play_command
-from keras_pendulum.play import drawing
-from keras_pendulum.play import window as window_module
 from keras_pendulum.play.control_c import control_c
-from keras_pendulum.play.drawing import INK, SMALL, Writer, draw_portrait
 from keras_pendulum.play.episode import ManualEpisode
 from keras_pendulum.play.game import READY_FRAMES, Game, Key, View
-from keras_pendulum.play.pendulum import draw_pendulum
-from keras_pendulum.play.played_tasks import PLAYED_TASKS, played_task
+from keras_pendulum.play.played_task import PLAYED_TASKS, played_task
 from keras_pendulum.play.window import Window, play
 
 NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
@@ -151,7 +152,7 @@ def test_pole_that_falls_ends_the_drive_and_the_network_balances_it(no_window: N
 def test_held_key_acts_until_it_is_released(task: Any, no_window: None) -> None:
     keys = {1: [pygame.K_h, pygame.K_l], 4: -pygame.K_l, 7: [pygame.K_j, -pygame.K_l]}
     player = play_game({**keys, 9: [-pygame.K_j, pygame.K_ESCAPE]}, task=task)
-    push = played_task(task).largest_effort
+    push = scene(task).largest_effort
     without = [push, -push, push] if isinstance(task, CartPole) else [0.0] * 3
     assert player.torques == [push] * 3 + without + [-push] * 2
 
@@ -164,7 +165,7 @@ def test_released_key_acts_on_without_the_switch(no_window: None) -> None:
 @pytest.mark.parametrize(("angle", "side"), [(-0.2, "left"), (0.2, "right")])
 def test_pole_leans_to_the_side_of_its_angle(angle: float, side: str) -> None:
     state = np.array([0, 0, angle, 0], np.float32)
-    pixels = pygame.surfarray.array3d(played_task(CartPole()).draw(state, 0.0, (500, 456)))
+    pixels = pygame.surfarray.array3d(scene(CartPole()).draw(state, 0.0, (500, 456)))
     pole = (abs(pixels.astype(int) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
     assert (pole[:250].sum() > 3 * pole[250:].sum()) == (side == "left")
 
@@ -239,8 +240,8 @@ def test_after_the_score_r_repeats_the_start_and_enter_plays_the_next(no_window:
 def test_window_shows_torque_pendulum_and_numbers(no_window: None) -> None:
     player = play_game({1: pygame.K_l, 10: pygame.K_j, 20: pygame.K_j, 21: pygame.K_ESCAPE})
     assert player.pixels[1].shape == (1000, 640, 3)
-    bar = window_module._BAR
-    right, left = (bar.centerx + 50, bar.centery), (bar.centerx - 50, bar.centery)
+    middle, height = 250, 529  # of the bar of the torque
+    right, left = (middle + 50, height), (middle - 50, height)
     frames = player.pixels.values()
     colours = [[tuple(pixels[point]) for point in (left, right)] for pixels in frames]
     empty, blue = drawing.WHITE, rgb(CLOCKWISE)
@@ -289,9 +290,10 @@ PLAYED = played_task(Pendulum())
 
 def portrait(path: Any, earlier: Any = ()) -> Any:
     """Returns the pixels [1000, 640, 3] of a phase portrait."""
-    screen = pygame.Surface(window_module._SIZE)
+    screen = pygame.Surface((1000, 640))
     screen.fill(drawing.WHITE)
-    draw_portrait(screen, Writer(screen).write, window_module._RIGHT, PLAYED, path, earlier)
+    place = pygame.Rect(500, 48, 500, 456)
+    draw_portrait(screen, Writer(screen).write, place, scene(Pendulum()), path, earlier)
     return pygame.surfarray.array3d(screen)
 
 
@@ -351,7 +353,7 @@ def test_window_says_that_it_loads_before_the_policy_is_loaded(
 
 def test_strip_along_the_lower_edge_grows_with_the_episode(no_window: None) -> None:
     player = play_game({1: pygame.K_l, 101: pygame.K_j, 201: pygame.K_ESCAPE})
-    row = window_module._TOP + window_module._SIDE - 2
+    row = 502
     rows = [pixels[:, row] for pixels in player.pixels.values()]
     strips = [(row_pixels == drawing.LINE).all(axis=-1) for row_pixels in rows]
     assert [int(strip.sum()) for strip in strips] == [0, 500, 1000]

@@ -1,4 +1,4 @@
-"""CartPole in the game."""
+"""The drawing of CartPole."""
 
 from __future__ import annotations
 
@@ -7,49 +7,28 @@ from typing import Any, ClassVar
 
 import pygame
 
+from keras_pendulum.figures.drawing import INK, LINE, PAPER, ROD, WHITE
+from keras_pendulum.figures.scene import Observation, Scene
 from keras_pendulum.figures.style import rgb, torque_color
 from keras_pendulum.optimum.cartpole_dynamics import FORCE, LARGEST_ANGLE, LARGEST_POSITION
-from keras_pendulum.play.drawing import INK, LINE, PAPER, ROD, WHITE
-from keras_pendulum.play.played_task import Observation, PlayedTask
 
 _POLE = 1.0  # m, its length
 
 
-class PlayedCartPole(PlayedTask):
-    """A key sets the direction of the push.
-
-    CartPole has no step without a push, so the pushes alternate without a key.
-    """
+class CartPoleScene(Scene):
+    """The cart on its track, with the push as an arrow."""
 
     effort: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
     largest_effort: ClassVar[float] = FORCE
     rightward: ClassVar[int] = 1
     directions: ClassVar[tuple[str, str]] = ("left", "right")
-    keys: ClassVar[str] = (
-        "j or Left: push left      k or Down: alternate      l or Right: push right"
-    )
     return_digits: ClassVar[int] = 0
-    angles: ClassVar[dict[float, str]] = {-LARGEST_ANGLE: "-12°", 0: "0°", LARGEST_ANGLE: "12°"}
+    angles: ClassVar[dict[float, str]] = {-LARGEST_ANGLE: "−12°", 0: "0°", LARGEST_ANGLE: "12°"}
     speeds: ClassVar[tuple[float, ...]] = (-3, -1.5, 0, 1.5, 3)
 
-    @property
-    def setting(self) -> str:
-        """The speed of the game: a hand is too slow for the real one."""
-        return "slow motion, 20 steps a second"
-
-    def effort_of(self, direction: int, step: int) -> float:
-        """Returns the force in N, to the right."""
-        return FORCE * (direction or (1 if step % 2 else -1))
-
-    def action(self, effort: float) -> int:
-        """Returns 0 or 1. Raises ValueError for another force than ±10 N."""
-        if abs(effort) != FORCE:
-            raise ValueError(f"force is {effort!r}; expected -{FORCE:g} or {FORCE:g} (N)")
-        return int(effort > 0)
-
     def effort_of_action(self, action: Any) -> float:
-        """Returns the force in N."""
+        """Returns the force in N, to the right."""
         return FORCE if action == 1 else -FORCE
 
     def state(self, observation: Observation) -> tuple[float, float]:

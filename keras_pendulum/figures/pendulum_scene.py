@@ -1,4 +1,4 @@
-"""The pendulum in the game."""
+"""The drawing of the pendulum."""
 
 from __future__ import annotations
 
@@ -9,45 +9,28 @@ from typing import Any, ClassVar
 import numpy as np
 import pygame
 
-from keras_pendulum.environments.pendulum import MAX_SPEED, Pendulum
-from keras_pendulum.environments.torque import MAX_TORQUE, require_torque
+from keras_pendulum.environments.pendulum import MAX_SPEED
+from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.figures.drawing import INK, PAPER, ROD, WHITE
+from keras_pendulum.figures.scene import Observation, Scene
 from keras_pendulum.figures.style import rgb, torque_color
-from keras_pendulum.play.drawing import INK, PAPER, ROD, WHITE
-from keras_pendulum.play.played_task import Observation, PlayedTask
 
 
-class PlayedPendulum(PlayedTask):
-    """A key sets the torque to -2, 0 or 2 N·m."""
+class PendulumScene(Scene):
+    """The pendulum, with its torque as an arrow around the pivot."""
 
-    task: Pendulum
     effort: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N·m"
     largest_effort: ClassVar[float] = MAX_TORQUE
     rightward: ClassVar[int] = -1
     directions: ClassVar[tuple[str, str]] = ("clockwise", "counterclockwise")
-    keys: ClassVar[str] = "l or Left: +2 N·m      k or Down: 0      j or Right: -2 N·m"
     return_digits: ClassVar[int] = 1
-    angles: ClassVar[dict[float, str]] = {-math.pi: "-180°", 0: "0° (upright)", math.pi: "180°"}
+    angles: ClassVar[dict[float, str]] = {-math.pi: "−180°", 0: "0° (upright)", math.pi: "180°"}
     speeds: ClassVar[tuple[float, ...]] = (-MAX_SPEED, -4, 0, 4, MAX_SPEED)
-
-    @property
-    def setting(self) -> str:
-        """The gravity."""
-        return f"g = {self.task.gravity:g} m/s²"
-
-    def effort_of(self, direction: int, step: int) -> float:
-        """Returns the torque in N·m."""
-        return MAX_TORQUE * direction
-
-    def action(self, effort: float) -> Any:
-        """Returns the torque as an array [1]. Raises ValueError for one outside of ±2 N·m."""
-        # The environment would clip a larger torque, and its state would stay NaN after a NaN.
-        require_torque(effort)
-        return np.array([effort])
 
     def effort_of_action(self, action: Any) -> float:
         """Returns the torque in N·m."""
-        return self.task.torque_of(action)
+        return float(np.reshape(action, -1)[0])
 
     def state(self, observation: Observation) -> tuple[float, float]:
         """Returns θ, -π to π, and θ̇."""
@@ -57,7 +40,7 @@ class PlayedPendulum(PlayedTask):
     def draw(
         self, observation: Observation, effort: float, size: tuple[int, int]
     ) -> pygame.Surface:
-        """Returns a picture of the pendulum, with its torque as an arrow around the pivot."""
+        """Returns a picture of the pendulum and of its torque."""
         return draw_pendulum(self.state(observation)[0], effort, size)
 
 
