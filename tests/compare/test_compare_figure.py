@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -52,6 +53,29 @@ def test_curve_of_cartpole_shows_returns() -> None:
     curves = drawn(make_runs([1.0], preset="cartpole"), 500.0).axes[0]
     assert np.asarray(curves.lines[0].get_ydata())[1] == 100.5
     assert curves.get_ylabel() == "Return (steps)"
+
+
+def test_runs_of_different_lengths_have_their_steps_in_their_names() -> None:
+    long, short = make_runs([1.0, 2.0], [f"{'a long name, ' * 4}{n}" for n in range(2)])
+    short = dataclasses.replace(short, history=short.history[:15])
+    figure = drawn([long, short], -0.2)
+    require_legible(figure)
+    names = [text.get_text() for text in figure.axes[1].get_yticklabels()]
+    assert [name.splitlines()[-1] for name in names] == ["after 8,000 steps", "after 3,000 steps"]
+    same = drawn(make_runs([1.0, 2.0]), -0.2)
+    assert [text.get_text() for text in same.axes[1].get_yticklabels()] == ["run0", "run1"]
+
+
+def test_preset_has_the_same_colour_in_every_comparison() -> None:
+    def colours(*presets: str) -> list[str]:
+        runs = [make_runs([1.0], preset=preset)[0] for preset in presets]
+        return [str(line.get_color()) for line in drawn(runs, -0.2).axes[0].lines[:-1]]
+
+    original, reference, swingup = colours("original", "reference", "swingup")
+    assert len({original, reference, swingup, "black"}) == 4
+    assert colours("swingup", "original") == [swingup, original]
+    assert colours("reference", "reference", "swingup")[::2] == [reference, swingup]
+    assert len(set(colours(*["reference"] * 7))) == 7
 
 
 @pytest.mark.parametrize(
