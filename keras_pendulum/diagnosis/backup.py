@@ -64,7 +64,7 @@ class Backup(NamedTuple):
         causes = np.column_stack([np.ones(len(observed)), observed, np.abs(observed[:, 2:])])
         offset = self.offset
         solution, *_ = np.linalg.lstsq(causes, offset, rcond=None)
-        unexplained = 0.4 if causes.shape[1] == 5 else 0.2  # more causes explain more by chance
+        unexplained = 0.4 if causes.shape[1] == 5 else 0.15  # more causes explain more by chance
         return bool((offset - causes @ solution).var() < unexplained * offset.var())
 
     @property

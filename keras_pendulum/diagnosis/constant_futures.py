@@ -88,12 +88,13 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
     mean, spread = float(offset.mean()), float(offset.std())
     size = float(np.abs(declared.reward).mean())
     end = float(declared.q[~declared.continues].mean()) if not declared.continues.all() else size
-    none = abs(mean) < 0.03 * size and spread < 0.05 * size
+    # The values of a network that has never learned are smooth, and some are small.
+    smooth = declared.offset_is_smooth and spread > 0.01 * size
+    none = abs(mean) < 0.03 * size and spread < 0.05 * size and not smooth
     small = (
         not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
     )
-    # The values of a network that has never learned are smooth, and smaller.
-    index = small and (mean > 0.5 * size or (mean > 0 and not declared.offset_is_smooth))
+    index = small and mean > 0 and not smooth
     for equation in _offset_equations(declared):
         offsets = {
             "no-bootstrapping": none,
@@ -104,6 +105,8 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
         name = equation.variant or equation.name
         share = max(equation.share, 0.6)
         equation = replace(equation, offset=offsets[name], largest_error=1.6, share=share)
+        if name == "index-for-value":  # values that are nearly the same have large errors
+            equation = replace(equation, largest_error=2.2, share=0.3)
         yield _highest_everywhere(equation) if name == "batch-max" else equation
     lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
     yield replace(

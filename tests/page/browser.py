@@ -53,9 +53,17 @@ class Player:
     def __init__(self, driver: webdriver.Chrome) -> None:
         self.driver = driver
 
-    def set_screen(self, width: int, height: int, **media: str) -> None:
-        """Sets the size of the screen, and preferences such as `color-scheme`."""
+    def set_screen(
+        self, width: int, height: int, *, touch: bool | None = None, **media: str
+    ) -> None:
+        """Sets the size of the screen, and preferences such as `color-scheme`.
+
+        A small screen is one that is touched, if `touch` does not say otherwise.
+        """
         phone = width < 600
+        if touch is None:
+            touch = min(width, height) < 450
+        self.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": touch})
         size = {"width": width, "height": height, "deviceScaleFactor": 1 + phone, "mobile": phone}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         features = [{"name": f"prefers-{key}", "value": value} for key, value in media.items()]

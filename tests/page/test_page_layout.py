@@ -158,3 +158,24 @@ def luminance(colour: str) -> float:
     c = np.array(to_rgb(colour))
     linear = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+@pytest.mark.parametrize("name", ["small", "cartpole"])
+def test_large_zoom_has_the_page_in_one_column(
+    name: str, pages: dict[str, str], player: Player
+) -> None:
+    player.open_paused(pages[name])
+    # A desktop's window of 1366 × 657 at a zoom of 200 %, and of 1280 × 800 at one of 250 %.
+    for width, height in ((683, 328), (512, 320)):
+        sides = {}
+        for touch in (True, False):
+            player.set_screen(width, height, touch=touch)
+            player.redraw()
+            pair, readings = player.boxes("#pair", "#readings")
+            sides[touch] = readings["top"] < pair["bottom"]
+            letters = player.run(
+                "return [...document.querySelectorAll('#readings *')]"
+                ".map(e => parseFloat(getComputedStyle(e).fontSize))"
+            )
+            assert touch or min(letters) >= 12
+        assert sides == {True: width > 576, False: False}
