@@ -117,6 +117,7 @@ COMMANDS = (
     Command("pages.fault_pictures", 5, (FOLDER,)),
     Command("pages.first_run", 2, results=("first_run",), packages=("psutil",)),
     Command("pages.screenshots", 1, packages=("pygame", "selenium")),
+    Command("pages.thumbnails", 1, packages=("PIL",)),
     Command("pages.notebook", 5, packages=("nbclient", "ipykernel", "PIL")),
     Command("tables", 1, packages=("scipy",)),
 )

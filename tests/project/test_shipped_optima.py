@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.learning import shipped_optima
+from keras_pendulum.optimum.cartpole_values import file_name, pack
 from keras_pendulum.optimum.stored_results import Problem, read_returns
 
 
@@ -19,7 +20,11 @@ def test_benchmark_writes_the_files_of_the_package(
     def fast_returns(problem: Problem, starts: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(-np.dot(problem, (1, 0.001, 1)) - np.abs(starts[:, 0]))
 
+    def fast_table(discount: float) -> NDArray[Any]:
+        return np.full((2, 3), discount, np.float32)
+
     monkeypatch.setattr(shipped_optima, "compute_returns", fast_returns)
+    monkeypatch.setattr(shipped_optima, "solve_cartpole", fast_table)
     shipped_optima.main(str(tmp_path))
     shipped = {path.name for path in shipped_optima.DATA.iterdir()}
     assert {path.name for path in tmp_path.iterdir()} == shipped
@@ -29,3 +34,7 @@ def test_benchmark_writes_the_files_of_the_package(
             returns.keys() == read_returns(shipped_optima.DATA / problem.file_name, problem).keys()
         )
         assert max(returns.values()) == pytest.approx(-np.dot(problem, (1, 0.001, 1)), abs=0.01)
+    for discount in shipped_optima.CARTPOLE_DISCOUNTS:
+        with np.load(tmp_path / file_name(discount)) as written:
+            for name, array in pack(fast_table(discount)).items():
+                assert written[name].tolist() == array.tolist()
