@@ -60,10 +60,14 @@ def constant_values(future: float, at_end: float = 0.0) -> Any:
     return values
 
 
-def frozen_values(observations: Any) -> Any:
-    """Returns Q-values [B, 2]: the reward and a little that is linear in the next state."""
-    outcomes = step_forces(EXACT.states_of(observations), FORCES)
-    return 1 + np.where(outcomes.terminated, 0, 0.1 + 0.05 * outcomes.state.sum(axis=2))
+def frozen_values(mean: float, slope: float) -> Any:
+    """Returns a function for Q-values [B, 2]: the reward and a line over the next state."""
+
+    def values(observations: Any) -> Any:
+        outcomes = step_forces(EXACT.states_of(observations), FORCES)
+        return 1 + np.where(outcomes.terminated, 0, mean + slope * outcomes.state.sum(axis=2))
+
+    return values
 
 
 def first(values: Any, **options: Any) -> str:
@@ -86,7 +90,9 @@ def first(values: Any, **options: Any) -> str:
         ("wrong-loss (batch-broadcast)", lambda o: 9 + 0.001 * np.sin(o[:, :2])),
         ("wrong-target (batch-max or same-state)", constant_values(18.0)),
         ("wrong-target (index-for-value)", constant_values(0.8)),
-        ("wrong-target (frozen-target)", frozen_values),
+        ("wrong-target (frozen-target)", frozen_values(0.1, 0.05)),
+        ("wrong-target (frozen-target)", frozen_values(0.0, 0.05)),
+        ("wrong-target (frozen-target or index-for-value)", frozen_values(0.5, 0.4)),
         ("wrong-loss (zero-others)", values_with_zeros),
         ("broken-network", lambda o: np.full((len(o), 2), np.nan)),
     ],

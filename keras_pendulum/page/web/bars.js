@@ -35,7 +35,7 @@ function drawBars(canvas, colours, task, { efforts, values, exact, best, end, ta
   context.save();
   context.translate(12, (top + bottom) / 2);
   context.rotate(-Math.PI / 2);
-  write(context, "discounted return", 0, 0);
+  write(context, "Q-value", 0, 0);
   context.restore();
 
   values.forEach((value, i) => {
