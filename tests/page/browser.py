@@ -54,7 +54,7 @@ class Player:
         self.driver = driver
 
     def set_screen(
-        self, width: int, height: int, *, touch: bool | None = None, **media: str
+        self, width: int, height: int, touch: bool | None = None, /, **media: str
     ) -> None:
         """Sets the size of the screen, and preferences such as `color-scheme`.
 

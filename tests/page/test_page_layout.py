@@ -169,7 +169,7 @@ def test_large_zoom_has_the_page_in_one_column(
     for width, height in ((683, 328), (512, 320)):
         sides = {}
         for touch in (True, False):
-            player.set_screen(width, height, touch=touch)
+            player.set_screen(width, height, touch)
             player.redraw()
             pair, readings = player.boxes("#pair", "#readings")
             sides[touch] = readings["top"] < pair["bottom"]
