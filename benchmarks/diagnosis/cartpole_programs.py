@@ -7,6 +7,15 @@ from typing import Any
 from benchmarks.diagnosis.stranger_programs import Mistake
 
 _CARTPOLE: dict[str, Any] = {"environment": "CartPole-v1"}
+_TUTORIAL: dict[str, Any] = {
+    "library": "torch",
+    "activation": "relu",
+    "hidden": (128, 128),
+    "discount": 0.99,
+    "learning_rate": 3e-4,
+    "copy_every": 0,
+    "soft_copy": 0.005,
+}
 
 
 def _mistake(finding: str, variant: str = "", hand_in: str = "", **changes: Any) -> Mistake:
@@ -53,18 +62,15 @@ _MISTAKES = {
     ),
     "random actions only": _mistake("exploration", hand_in="record", epsilon=lambda done: 1.0),
     "buffer of 100 steps": _mistake("forgetting", hand_in="record transitions", capacity=100),
+    "the tutorial's, minimum of the next values": _mistake(
+        "wrong-target", "min-next", target="min", **_TUTORIAL
+    ),
+    "the tutorial's, no lookahead": _mistake("no-bootstrapping", target="none", **_TUTORIAL),
+    "the tutorial's, end not stored": _mistake("missing-end", ends_never=True, **_TUTORIAL),
 }
 _RIGHT: dict[str, dict[str, Any]] = {
     "right": {},
-    "the tutorial's program": {
-        "library": "torch",
-        "activation": "relu",
-        "hidden": (128, 128),
-        "discount": 0.99,
-        "learning_rate": 3e-4,
-        "copy_every": 0,
-        "soft_copy": 0.005,
-    },
+    "the tutorial's program": _TUTORIAL,
     "penalty for the fall": {"last_reward": -10.0},
     "a third of the training": {"steps": 5_000},
     "a tenth of the training": {"steps": 1_500},
