@@ -23,6 +23,7 @@ from tensorboard.plugins.hparams.metadata import SESSION_START_INFO_TAG
 import keras_pendulum as kp
 from keras_pendulum.__main__ import COMMANDS
 from keras_pendulum.evaluate import __main__ as evaluate
+from keras_pendulum.evaluate.film import SIZE
 from keras_pendulum.train import __main__ as train
 from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint
 from keras_pendulum.train.progress import Progress
@@ -181,7 +182,7 @@ def test_gif_has_the_shape_and_speed_of_the_environment(
     assert in_process(*words, "film.gif").returncode == 0
     steps = int(kp.evaluate_policy(pole, 1).mean_return)
     with Image.open(tmp_path / "film.gif") as film:
-        assert film.size == (320, 342)
+        assert film.size == SIZE
         shown = [frame.info["duration"] for frame in ImageSequence.Iterator(film)]
     assert shown == [5 * 20] * (steps // 5 + 1)  # ms; each fifth step, and the last one
     done = in_process(*words, "no/such/folder.gif")
