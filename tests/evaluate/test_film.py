@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pygame
 import pytest
+from drawn_texts import record_texts, require_legible_texts
 from PIL import Image
 
 import keras_pendulum as kp
@@ -23,7 +24,7 @@ from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.evaluate import film, film_command
 from keras_pendulum.evaluate.film import SIZE, draw_frame
-from keras_pendulum.figures.drawing import INK, SMALL, Writer
+from keras_pendulum.figures.drawing import Writer
 from keras_pendulum.figures.moment import Moment
 from keras_pendulum.figures.scenes import SCENES, scene
 from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
@@ -196,26 +197,12 @@ def test_edges_of_the_drawing_are_smooth() -> None:
 def test_texts_of_a_frame_do_not_overlap_and_are_inside(
     task: Task, state: Any, numbers: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    boxes: list[pygame.Rect] = []
-    write = Writer.write
-
-    def record(
-        self: Writer, text: str, place: tuple[int, int], *options: Any, **named: Any
-    ) -> None:
-        write(self, text, place, *options, **named)
-        drawn = self._render(text, (*options, SMALL)[0], named.get("color", INK))
-        left = place[0] - round(named.get("align", 0.0) * drawn.get_width())
-        boxes.append(drawn.get_rect(topleft=(left, place[1])))
-
-    monkeypatch.setattr(Writer, "write", record)
+    boxes = record_texts(monkeypatch)
     effort = -scene(task).largest_effort
     titles = ("a_longer_name_of_a_file, g = 100 m/s²", "start of seed 4294967295")
     frame(task, state, effort, titles=titles, step=200, reward=-16.274, **numbers)
     assert len(boxes) == 23
-    for i, box in enumerate(boxes):
-        assert pygame.Rect((0, 0), SIZE).contains(box), box
-        # Each line has some empty pixels above and below its letters.
-        assert box.inflate(0, -6).collidelist([b.inflate(0, -6) for b in boxes[:i]]) == -1
+    require_legible_texts(boxes, SIZE)
 
 
 def test_numbers_of_a_frame_have_no_negative_zero(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 import pygame
 import pytest
 from conftest import Command, Refusal, command_line, wait_for
+from drawn_texts import record_texts, require_legible_texts
 
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
@@ -27,7 +28,7 @@ from keras_pendulum.evaluate import __main__ as evaluate_command
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.evaluate.sources import as_policy
 from keras_pendulum.figures import drawing
-from keras_pendulum.figures.drawing import INK, SMALL, Writer
+from keras_pendulum.figures.drawing import Writer
 from keras_pendulum.figures.moment import draw_portrait
 from keras_pendulum.figures.pendulum_scene import draw_pendulum
 from keras_pendulum.figures.scenes import scene
@@ -256,26 +257,13 @@ def test_window_shows_torque_pendulum_and_numbers(no_window: None) -> None:
 def test_no_text_overlaps_another_or_leaves_the_window(
     no_window: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    boxes: list[pygame.Rect] = []
-    write, show = Writer.write, Window.show
-
-    def record(
-        self: Writer, text: str, place: tuple[int, int], *options: Any, **named: Any
-    ) -> None:
-        write(self, text, place, *options, **named)
-        drawn = self._render(text, (*options, SMALL)[0], named.get("color", INK))
-        left = place[0] - round(named.get("align", 0.0) * drawn.get_width())
-        boxes.append(drawn.get_rect(topleft=(left, place[1])))
+    boxes, show = record_texts(monkeypatch), Window.show
 
     def check(self: Window, view: View) -> None:
         show(self, view)
-        for i, box in enumerate(boxes):
-            assert self._screen.get_rect().contains(box), box
-            # Each line has some empty pixels above and below its letters.
-            assert box.inflate(0, -6).collidelist([b.inflate(0, -6) for b in boxes[:i]]) == -1
+        require_legible_texts(boxes, self._screen.get_size())
         boxes.clear()
 
-    monkeypatch.setattr(Writer, "write", record)
     monkeypatch.setattr(Window, "show", check)
     policy = as_policy(lambda observation: -2.0)
     keys = {1: [pygame.K_h, pygame.K_l], 405: pygame.K_ESCAPE}
