@@ -96,6 +96,7 @@ COMMANDS = (
     Command("speed.inner_loops", 1, results=("inner_loops",), packages=("psutil", "torch")),
     Command("speed.installation", 10, results=("installation",)),
     Command("speed.import_time", 1, results=("import_time",), packages=("psutil",)),
+    Command("speed.frames", 2, results=("frames",), packages=("selenium",)),
     Command("speed.recorder", 1, results=("recorder",), packages=("psutil",)),
     Command("speed.long_run", 2, results=("long_run",), packages=("psutil",)),
     Command("speed.saving", 2, results=("saving",), packages=("psutil",)),

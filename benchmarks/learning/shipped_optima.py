@@ -4,7 +4,8 @@
 
 Computes the best possible returns of the pendulum for the seeds 0 to 9999, and those of the optimal
 policy for the discount of `reference` and `swingup` for the seeds 0 to 999. Computes the optimal
-values of CartPole for the usual discounts. It takes some ten minutes.
+values of the pendulum's episodes, and those of CartPole for the usual discounts. It takes some ten
+minutes.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.optimum import episode_values
 from keras_pendulum.optimum.best_return import compute_returns
 from keras_pendulum.optimum.cartpole_values import file_name, pack, solve_cartpole
 from keras_pendulum.optimum.stored_results import Problem, write, write_arrays
@@ -28,6 +30,7 @@ SHIPPED = [
     for steps in (200, training_steps)
     for discount in (1.0, own_discount)
 ]
+GRAVITIES = (1.0, 10.0)
 CARTPOLE_DISCOUNTS = (0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
 
 
@@ -39,6 +42,11 @@ def main(folder: str = str(DATA)) -> None:
         path = Path(folder) / problem.file_name
         write(path, problem, seeds=np.array(seeds), returns=returns)
         print(f"{path}: mean {returns.mean():.4f}")
+    for gravity in GRAVITIES:
+        path = Path(folder) / episode_values.file_name(Problem.valid(gravity))
+        values = episode_values.solve_episode(gravity)
+        write_arrays(path, episode_values.pack(values))
+        print(f"{path}: root of the lowest value {values.roots.max() * values.scale:.4f}")
     for discount in CARTPOLE_DISCOUNTS:
         path, table = Path(folder) / file_name(discount), solve_cartpole(discount)
         write_arrays(path, pack(table))

@@ -9,51 +9,25 @@ It needs Chromium and its chromedriver, and takes a minute.
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
-from pathlib import Path
 
+from benchmarks.pages.headless_page import open_page, wait_for
 from benchmarks.result_files import ROOT
 
 _DOCS = ROOT / "docs"
-_SIZE = (1280, 657)
 _PAGES = {
     "page.png": ("reference original", "pendulum.reset(2.2, 0.5)", 22),
     "cartpole_page.png": ("cartpole cartpole-original", "pendulum.reset(0.5, 0, 0.05, 0)", 60),
 }
 
 
-def draw_page(name: str, networks: str, start: str, steps: int, folder: Path) -> None:
+def draw_page(name: str, networks: str, start: str, steps: int) -> None:
     """Writes the picture of a page with two networks after some steps from a start."""
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    from keras_pendulum.page import __main__ as page_command
-
     first, second = networks.split()
-    out = folder / "page.html"
-    page_command.main([first, "--against", second, "--out", str(out)])
-    options = webdriver.ChromeOptions()
-    options.binary_location = str(shutil.which("chromium"))
-    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu"):
-        options.add_argument(flag)
-    browser = webdriver.Chrome(options, Service(str(shutil.which("chromedriver"))))
-    try:
-        width, height = _SIZE
-        screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
-        browser.get(out.as_uri())
+    with open_page(first, "--against", second) as browser:
         browser.execute_script(f"pendulum.page.pause(false); {start}")
         browser.execute_script(f"for (let i = 0; i < {steps}; i++) pendulum.step()")
-        browser.set_script_timeout(60)
-        browser.execute_async_script(
-            "const done = arguments[0];"
-            "const wait = () => pendulum.page.map.ready && !pendulum.page.changed"
-            "  ? done() : setTimeout(wait, 50); wait()"
-        )
+        wait_for(browser, "pendulum.page.map.ready && !pendulum.page.changed")
         browser.save_screenshot(str(_DOCS / name))
-    finally:
-        browser.quit()
 
 
 def draw_game() -> None:
@@ -82,9 +56,8 @@ def draw_game() -> None:
 
 def main() -> None:
     """Draws all pictures."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name, (networks, start, steps) in _PAGES.items():
-            draw_page(name, networks, start, steps, Path(folder))
+    for name, (networks, start, steps) in _PAGES.items():
+        draw_page(name, networks, start, steps)
     draw_game()
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import count
 from typing import TYPE_CHECKING
 
 from keras_pendulum.compare.runs import ComparedRun
-from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.errors import one_line
-from keras_pendulum.figures.curves import curve_style, draw_legend_below, draw_marked_curve
+from keras_pendulum.figures.curves import curve_styles, draw_legend_below, draw_marked_curve
 from keras_pendulum.figures.learning_curve import (
     MEAN_OVER,
     OPTIMUM,
@@ -32,9 +30,10 @@ def draw_comparison(runs: Sequence[ComparedRun], optimum: float | None) -> bytes
     """
     from matplotlib.figure import Figure
 
+    styles = curve_styles([run.config.preset for run in runs])
     rows = [
-        RegretRow(name, run.score.regret, curve_style(style))
-        for name, run, style in zip(_row_names(runs), runs, _styles(runs), strict=True)
+        RegretRow(name, run.score.regret, style)
+        for name, run, style in zip(_row_names(runs), runs, styles, strict=True)
     ]
     with own_style():
         # Each run needs a row of the regrets, and a third of a row of the legend.
@@ -65,21 +64,6 @@ def _draw_curves(axes: Axes, runs: Sequence[ComparedRun], rows: Sequence[RegretR
     axes.set(xlabel="Environment steps", ylabel=task.curve_label)
     axes.set_title(f"While learning, mean of {MEAN_OVER} episodes")
     axes.grid(color="0.9")
-
-
-def _styles(runs: Sequence[ComparedRun]) -> list[int]:
-    """Returns the indices of the runs' styles. A preset has the same one in every comparison."""
-    of_preset = {name: index for index, name in enumerate(PRESETS, 1)}  # 0, black, is the optimum
-    taken = {of_preset.get(run.config.preset, 0) for run in runs}
-    others = (index for index in count(1) if index not in taken)
-    seen: set[str] = set()
-    styles = []
-    for run in runs:
-        preset = run.config.preset
-        first = preset in of_preset and preset not in seen
-        styles.append(of_preset[preset] if first else next(others))
-        seen.add(preset)
-    return styles
 
 
 def _row_names(runs: Sequence[ComparedRun]) -> list[str]:

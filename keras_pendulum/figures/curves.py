@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from keras_pendulum.config.presets import PRESETS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +28,8 @@ STYLES: tuple[CurveStyle, ...] = (
     ("#56B4E9", (0, (1, 1)), "X"),
     ("#8C510A", (0, (8, 2)), "*"),
 )
+# The index of the style of each preset, the same everywhere; 0, black, is the optimum.
+PRESET_STYLES = {name: index for index, name in enumerate(PRESETS, 1)}
 _MARKERS = 8  # on each curve
 
 
@@ -34,6 +39,19 @@ def curve_style(index: int) -> CurveStyle:
     # With a shift of three, a repeated colour gets a line that looks different from its first one.
     _, line, marker = STYLES[(index + index // len(STYLES) * 3) % len(STYLES)]
     return color, line, marker
+
+
+def curve_styles(names: Sequence[str | None]) -> list[CurveStyle]:
+    """Returns the style of each curve. The first one of a preset has that of the preset."""
+    taken = {PRESET_STYLES.get(name or "", 0) for name in names}
+    others = (index for index in count(1) if index not in taken)
+    seen: set[str] = set()
+    styles = []
+    for name in names:
+        first = name in PRESET_STYLES and name not in seen
+        styles.append(curve_style(PRESET_STYLES[name] if first and name else next(others)))
+        seen.add(name or "")
+    return styles
 
 
 def draw_marked_curve(

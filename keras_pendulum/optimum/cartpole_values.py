@@ -15,8 +15,6 @@ The mirrored state has the same value, V(-s) = V(s), so half of the grid is comp
 from __future__ import annotations
 
 import logging
-from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,7 +29,14 @@ from keras_pendulum.optimum.cartpole_dynamics import (
     States,
     step_forces,
 )
-from keras_pendulum.optimum.stored_results import cache_file, read_arrays, write_arrays_to_cache
+from keras_pendulum.optimum.stored_results import (
+    cache_file,
+    join_words,
+    read_arrays,
+    shipped_file,
+    split_words,
+    write_arrays_to_cache,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -54,9 +59,8 @@ def cartpole_value(discount: float) -> Table:
     """
     discount = Number(0, 1).validate("discount", discount) + 0.0  # -0.0 becomes 0.0
     name = file_name(discount)
-    shipped = Path(str(resources.files("keras_pendulum.optimum"))) / "data" / name
     cache = cache_file(name)
-    for file in (shipped, cache):
+    for file in (shipped_file(name), cache):
         if (table := _unpack(read_arrays(file), discount)) is not None:
             return table
     _log.warning("Computing the exact values of CartPole for γ = %g, once: about 10 s", discount)
@@ -71,23 +75,15 @@ def file_name(discount: float) -> str:
 
 
 def pack(table: Table) -> dict[str, NDArray[np.uint8]]:
-    """Returns the arrays of a file: the two bytes of each value as float16.
-
-    Two arrays of bytes take a fifth less space than one of numbers.
-    """
-    bits = table.astype(np.float16).view(np.uint16)
-    return {"high": (bits >> 8).astype(np.uint8), "low": (bits & 255).astype(np.uint8)}
+    """Returns the arrays of a file: the two bytes of each value as float16."""
+    return split_words(table.astype(np.float16).view(np.uint16))
 
 
 def _unpack(arrays: dict[str, NDArray[Any]], discount: float) -> Table | None:
     """Returns the table of a file's arrays; None where they cannot be right."""
-    parts = [arrays.get("high"), arrays.get("low")]
-    high, low = parts
-    if high is None or low is None:
+    bits = join_words(arrays, (HALF,))
+    if bits is None:
         return None
-    if any(each.dtype != np.uint8 or each.shape != (HALF,) for each in (high, low)):
-        return None
-    bits = (high.astype(np.uint16) << 8) | low
     table = bits.view(np.float16).astype(np.float32)
     valid = (table >= 1) & (table <= 1.001 * highest_value(discount))  # false for NaN
     return table if valid.all() else None

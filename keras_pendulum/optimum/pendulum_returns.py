@@ -10,8 +10,6 @@ use, by `best_return`, and stored in the user's cache folder.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +17,13 @@ from numpy.typing import NDArray
 from keras_pendulum.config.fields import Integer
 from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, pendulum_starts
 from keras_pendulum.optimum.solution import USUAL_SEEDS
-from keras_pendulum.optimum.stored_results import Problem, cache_file, read_returns, write_to_cache
+from keras_pendulum.optimum.stored_results import (
+    Problem,
+    cache_file,
+    read_returns,
+    shipped_file,
+    write_to_cache,
+)
 
 
 def discounted_return(
@@ -45,9 +49,8 @@ def discounted_return(
     """
     problem, valid_seed = Problem.valid(gravity, steps, discount), Integer(0, 2**32 - 1)
     seeds = [valid_seed.validate("seed", seed) for seed in seeds]
-    shipped = Path(str(resources.files("keras_pendulum.optimum"))) / "data" / problem.file_name
     cache = cache_file(problem.file_name)
-    returns = read_returns(shipped, problem)
+    returns = read_returns(shipped_file(problem.file_name), problem)
     if not returns.keys() >= set(seeds):
         returns = read_returns(cache, problem) | returns
     if not returns.keys() >= set(seeds):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -101,6 +102,11 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
     write_atomically(path, buffer.getvalue())
 
 
+def shipped_file(name: str) -> Path:
+    """Returns the path of a file in the package; there need not be one."""
+    return Path(str(resources.files("keras_pendulum.optimum"))) / "data" / name
+
+
 def cache_file(name: str) -> Path | None:
     """Returns the path of a file in the user's cache folder; None for a user without a home."""
     try:
@@ -121,3 +127,17 @@ def write_arrays_to_cache(path: Path | None, arrays: dict[str, Any]) -> None:
         with contextlib.suppress(OSError, UserError):
             path.parent.mkdir(parents=True, exist_ok=True)
             write_arrays(path, arrays)
+
+
+def split_words(words: NDArray[np.uint16]) -> dict[str, NDArray[np.uint8]]:
+    """Returns the two bytes of each number; they take less space in a file than the numbers do."""
+    return {"high": (words >> 8).astype(np.uint8), "low": (words & 255).astype(np.uint8)}
+
+
+def join_words(arrays: dict[str, NDArray[Any]], shape: tuple[int, ...]) -> Any:
+    """Returns the numbers [shape] of `split_words`, uint16; None where the arrays are others."""
+    parts = [arrays.get(name) for name in ("high", "low")]
+    if any(each is None or each.dtype != np.uint8 or each.shape != shape for each in parts):
+        return None
+    high, low = parts
+    return (np.asarray(high, np.uint16) << 8) | np.asarray(low, np.uint16)

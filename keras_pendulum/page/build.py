@@ -19,6 +19,7 @@ from keras_pendulum.dqn.network import DQN
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.q_policies import DQNPolicy
+from keras_pendulum.figures.curves import PRESET_STYLES, curve_style
 from keras_pendulum.page.learning import learning_content
 from keras_pendulum.page.task_content import FOLDERS, optimum_content
 from keras_pendulum.storage.load_weights import recorded_return
@@ -71,10 +72,12 @@ def build_page(
 def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
     """Returns what the page knows of a network."""
     info = RunInfo.from_record(network.metadata)
+    style = PRESET_STYLES.get(info.preset or "")
     weights = b"".join(array.astype("<f4").tobytes() for array in network.get_weights())
     return {
         "name": path.name,
         "preset": info.preset,
+        "colour": None if style is None else curve_style(style)[0],
         "gravity": task.gravity,
         "trainedGravity": info.task.gravity if info.task else None,
         "evaluatedReturn": recorded_return(path),
@@ -95,7 +98,8 @@ def _fill(content: dict[str, Any], folder: str, lesson: bool) -> str:
 
     texts = {"folder": folder, **json.loads(read(f"{folder}/texts.json"))}
     texts["scenes"] = read("scenes/scenes.html") if lesson else ""
-    texts["last script"] = '<script src="scenes/scenes.js"></script>' if lesson else ""
+    script = '<script src="scenes/scenes.js"></script>'
+    texts["script of the lesson"] = script if lesson else ""
     page = re.sub(r"\{\{(.+?)\}\}", lambda m: texts[m[1]], read("page.html"))
     page = re.sub(
         r'<link rel="stylesheet" href="(.+)">', lambda m: f"<style>\n{read(m[1])}</style>", page

@@ -9,7 +9,7 @@ from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import preset
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
-from keras_pendulum.optimum.solutions import SOLUTIONS
+from keras_pendulum.optimum.solutions import SOLUTIONS, solution
 from keras_pendulum.train.evaluations import SEEDS
 
 _SMALL = (64, 64)  # hidden units; a run of `reference` takes about 16 s in a browser
@@ -131,6 +131,11 @@ def switched(config: Config, switch: Switch) -> Config | None:
     return changed if switch.own or changed != config else None
 
 
+def highest_return(task: Task) -> float:
+    """Returns the mean of the highest returns from the starts that the page evaluates."""
+    return float(solution(task).best_returns(SEEDS).mean())
+
+
 def learning_content(task: Task) -> dict[str, Any]:
     """Returns the settings by the names of the Config, the switches, and starts [N, D]."""
     config = learning_config(task)
@@ -146,6 +151,7 @@ def learning_content(task: Task) -> dict[str, Any]:
         "settings": {**healthy, **OWN_SETTINGS},
         "action_count": task.action_count(config.torque_count),
         "starts": SOLUTIONS[task.environment](task).starts(SEEDS).tolist(),
+        "highest_return": highest_return(task),
         "switches": switches,
         "networks": _OTHER_SIZES,
     }

@@ -9,7 +9,7 @@ import numpy as np
 
 from keras_pendulum.figures.curves import (
     CurveStyle,
-    curve_style,
+    curve_styles,
     draw_legend_below,
     draw_marked_curve,
 )
@@ -46,7 +46,8 @@ def draw_study(rows: Sequence[Row], results: Mapping[str, Sequence[RunResult]]) 
     from matplotlib.figure import Figure
 
     with_curve = [row for row in rows if row.arm.has_curve]
-    styles = {row.arm.name: curve_style(index) for index, row in enumerate(with_curve)}
+    names = [row.arm.name for row in with_curve]
+    styles = dict(zip(names, curve_styles(names), strict=True))
     tasks = list(dict.fromkeys(row.arm.task for row in with_curve))
     with own_style():
         # A panel needs 4 inches, a row half an inch, and three names a line of the legend.

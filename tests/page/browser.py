@@ -70,9 +70,11 @@ class Player:
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
     def open(self, address: str) -> None:
-        """Opens a page and waits until it is painted: before that, the browser drops keys."""
+        """Opens a page and waits until it has started and is painted: before, keys are dropped."""
         self.driver.get(address)
-        wait_for(lambda: self.run("return performance.getEntriesByType('paint').length > 0"))
+        started = "window.pendulum || document.getElementById('problem')?.hidden !== true"
+        painted = "performance.getEntriesByType('paint').length > 0"
+        wait_for(lambda: self.run(f"return Boolean({started}) && {painted}"))
 
     def open_paused(self, address: str) -> None:
         self.open(address)

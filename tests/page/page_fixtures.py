@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from browser import Player
     from selenium import webdriver
 
+    from keras_pendulum.environments.task import Task
+
 
 @pytest.fixture(scope="session")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
@@ -38,7 +40,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "swingup": kp.find_weights("swingup"),
         "cartpole": kp.find_weights("cartpole"),
         "cartpole-original": kp.find_weights("cartpole-original"),
-        "swingup with the exact optimum": kp.find_weights("swingup"),
         "small": folder / "<!--<script>&.h5",
         "one": folder / "one.h5",
         "two": folder / "two.h5",
@@ -46,10 +47,19 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def coarse_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Makes the optimum of new pages coarse, which is much faster."""
-    from keras_pendulum.page import task_content
+    """Makes an optimum that the package does not have coarse, which is much faster."""
+    from keras_pendulum.optimum.episode_values import EpisodeValues, episode_values, solve_episode
+    from keras_pendulum.page import learning, task_content
+    from keras_pendulum.page.learning import highest_return
 
-    monkeypatch.setattr(task_content, "THETA_CELLS", 50)
+    def values(gravity: float) -> EpisodeValues:
+        return episode_values(gravity) if gravity in (1, 10) else solve_episode(gravity, 26)
+
+    def highest(task: Task) -> float:
+        return highest_return(task) if task.gravity in (None, 1, 10) else 0.0
+
+    monkeypatch.setattr(task_content, "episode_values", values)
+    monkeypatch.setattr(learning, "highest_return", highest)
 
 
 class _Pages(dict[str, str]):
@@ -65,8 +75,7 @@ class _Pages(dict[str, str]):
         first, _, second = name.partition(" against ")
         against = ["--against", str(self._files[second])] if second else []
         with pytest.MonkeyPatch.context() as patched:
-            if "exact" not in name:
-                coarse_optimum(patched)
+            coarse_optimum(patched)
             assert page_command.main([str(self._files[first]), *against, "--out", str(out)]) == 0
         self[name] = out.as_uri()
         return self[name]

@@ -14,6 +14,7 @@ from selenium.webdriver.common.by import By
 
 import keras_pendulum as kp
 from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.figures.curves import PRESET_STYLES, curve_style
 from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.version import __version__
 
@@ -43,6 +44,27 @@ def test_two_networks_run_in_step_from_one_start(
     optimum = player.run("return pendulum.page.optimalReturn")
     assert optimum == pytest.approx(scores[0].optimal_mean_return, abs=0.02)
     assert all(player.find(f"name-{i}").is_displayed() for i in (0, 1))
+
+
+def test_a_preset_has_the_colour_of_the_other_pictures(
+    pages: dict[str, str], duel: str, player: Player
+) -> None:
+    mark = "getComputedStyle(document.getElementById('name-{}'), '::before').backgroundColor"
+
+    def marks() -> list[str]:
+        return [str(player.run(f"return {mark.format(i)}")) for i in (0, 1)]
+
+    player.open_paused(pages["swingup against reference"])
+    expected = [
+        "rgb({}, {}, {})".format(*bytes.fromhex(curve_style(PRESET_STYLES[name])[0][1:]))
+        for name in ("swingup", "reference")
+    ]
+    assert marks() == expected
+    player.press("t")  # the first one is driven by the user
+    content = player.run(f"return {mark.format(0)}".replace("backgroundColor", "content"))
+    assert content == "none"
+    player.open_paused(duel)  # two networks of no preset
+    assert marks() == ["rgba(0, 0, 0, 0)"] * 2
 
 
 def test_names_lines_and_q_values_belong_to_their_network(duel: str, player: Player) -> None:

@@ -87,19 +87,17 @@ def test_torques_of_keys_act_as_in_gymnasium(user: Player) -> None:
     assert fastest == 8  # the pendulum reached the speed limit
 
 
-@pytest.mark.parametrize(
-    ("name", "gravity"), [("reference", 1.0), ("swingup with the exact optimum", 10.0)]
-)
+@pytest.mark.parametrize(("name", "gravity"), [("reference", 1.0), ("swingup", 10.0)])
 def test_optimum_of_a_start_is_the_exact_one(
     name: str, gravity: float, pages: dict[str, str], player: Player
 ) -> None:
     player.open_paused(pages[name])
-    starts = pendulum_starts(range(20)).tolist()
+    starts = pendulum_starts(range(60)).tolist()
     found = player.run("return arguments[0].map(s => pendulum.page.optimum.returnFrom(s))", starts)
-    shortfall = kp.optimal_return(gravity, range(20)) - found
+    shortfall = kp.optimal_return(gravity, range(60)) - found
     assert shortfall.min() > -0.01  # a simulated return cannot be above the optimum
-    assert np.median(shortfall) < 0.05
-    assert shortfall.max() < (0.04 if gravity == 1 else 4)  # 0.02 with the exact optimum
+    assert shortfall.mean() < 0.01
+    assert shortfall.max() < 0.2
 
 
 def test_map_switches_to_the_optimum(user: Player) -> None:
@@ -122,7 +120,7 @@ def test_page_of_twenty_networks_has_at_most_eight_megabytes(
     arrays = network.get_weights()
     weights = np.concatenate([array.ravel() for array in arrays]).astype(np.float16)
     one = len(json.dumps(_encode(weights, [array.shape for array in arrays])))
-    address = pages["swingup with the exact optimum"]
+    address = pages["swingup"]
     page = Path(url2pathname(urlsplit(address).path)).stat().st_size
     assert page < 1_500_000
     curve = 500 * len("-0.1234, ")

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from browser import Player
 from conftest import Refusal, wait_for
-from page_fixtures import coarse_optimum
 from selenium.webdriver.common.by import By
 
 from keras_pendulum.page import __main__ as page_command
@@ -17,9 +16,7 @@ from keras_pendulum.page import __main__ as page_command
 @pytest.fixture(scope="module")
 def lesson(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("lesson") / "lesson.html"
-    with pytest.MonkeyPatch.context() as patched:
-        coarse_optimum(patched)
-        assert page_command.main(["--lesson", "--out", str(out)]) == 0
+    assert page_command.main(["--lesson", "--out", str(out)]) == 0
     return out
 
 

@@ -178,9 +178,8 @@ def test_learning_curve_is_the_mean_of_ten_episodes(run: Path) -> None:
 
 
 def test_run_without_snapshots_has_a_page_and_a_hint(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    coarse_optimum(monkeypatch)
     kp.save_weights(kp.DQN((8,), metadata={"gravity": 10.0}), tmp_path / "pendulum_weight.h5")
     out = tmp_path / "page.html"
     assert page_command.main([str(tmp_path), "--out", str(out)]) == 0

@@ -33,6 +33,7 @@ class Controls {
     }
     element("pause").firstElementChild.textContent = running ? "Pause" : "Play";
     element("name-0").textContent = youDrive ? "you" : names[0];
+    element("name-0").toggleAttribute("data-you", youDrive);
     element("status").textContent = statusText(this.page);
   }
 

@@ -8,7 +8,7 @@ function curveValue(curve, share) {
   return curve[Math.round(share * (curve.length - 1))];
 }
 
-/** Draws the learning curve, dashed lines at `levels`, and a cursor at the episode `here`. */
+/** Draws the learning curve in the colour `curve`, dashed lines at `levels`, and a cursor at the episode `here`. */
 function drawCurve(canvas, colours, { curve, levels }, here, end) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = [CURVE_AXIS + HALF_THUMB, width - HALF_THUMB, 5, height - 5];
@@ -34,7 +34,7 @@ function drawCurve(canvas, colours, { curve, levels }, here, end) {
     write(context, name, right, y(value) + (below ? 8 : -8), "right");
   }
   context.setLineDash([]);
-  context.strokeStyle = colours.accent;
+  context.strokeStyle = colours.curve;
   context.lineWidth = 2;
   line(context, curve.map((value, i) => [x(i / (curve.length - 1 || 1)), y(value)]));
   context.strokeStyle = context.fillStyle = colours.ink;

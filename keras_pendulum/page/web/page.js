@@ -139,11 +139,13 @@ class Page {
 
   /** Labels the systems and the layers of the map. */
   showNames() {
-    const { names } = this;
+    const { names, recorded } = this;
     if (!this.other) return;
     element("other").hidden = false;
     document.querySelector("figcaption").hidden = false;
     names.forEach((name, i) => {
+      const { colour } = i ? recorded.against : recorded;
+      element(`name-${i}`).style.setProperty("--preset", colour ?? "transparent");
       if (i) element(`name-${i}`).textContent = name;
       else element("values-title").textContent = `Q-values of ${name}`;
       const button = document.querySelector(`[data-layer="${i}"]`);

@@ -80,7 +80,8 @@ class Training {
     if (!this.changed) return;
     this.changed = false;
     const [here, end] = [this.episodes[this.shown], this.episodes.at(-1)];
-    drawCurve(element("curve"), colours, this, here, end);
+    const colour = this.recorded.colour ?? colours.accent;
+    drawCurve(element("curve"), { ...colours, curve: colour }, this, here, end);
   }
 
   #showTexts() {

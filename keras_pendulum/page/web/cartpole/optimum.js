@@ -8,18 +8,17 @@ const SURVIVING = 0.9; // share of the highest value that only a pole has which 
 /** The optimum: greedy on a table of the optimal value, as keras_pendulum/optimum describes it. */
 class Optimum {
   /**
-   * @param {{discount: number, table: string}} recorded γ, and the optimal value at the first half of
-   *   the grid points, in shares of the highest one: base64 of uint16.
+   * @param {{discount: number, table: Uint16Array}} recorded γ, and the optimal value at the first
+   *   half of the grid points, in shares of the highest one, which is 65535.
    */
   constructor({ discount, table }, task) {
     this.discount = discount;
     this.task = task;
     this.highest = 1 / (1 - discount);
-    const half = new Uint16Array(decodedBytes(table).buffer); // little-endian
     const count = POINTS.reduce((product, points) => product * points, 1);
-    if (half.length !== (count + 1) / 2) throw new Error("its table of the optimum has a wrong size");
+    if (table.length !== (count + 1) / 2) throw new Error("its table of the optimum has a wrong size");
     // The last half are the mirrored states, which have the same values.
-    const share = (i) => half[Math.min(i, count - 1 - i)];
+    const share = (i) => table[Math.min(i, count - 1 - i)];
     this.values = Float32Array.from({ length: count }, (_, i) => (share(i) / 65535) * this.highest);
     this.corner = { low: new Int32Array(4), weight: new Float64Array(4) };
   }

@@ -2,10 +2,13 @@
 
 /** The greedy regret: the highest return minus that of the greedy policy, mean over fixed starts. */
 class GreedyRegret {
-  constructor(task, optimum, starts) {
-    Object.assign(this, { task, starts });
-    const highest = starts.map((state) => optimum.returnFrom(state));
-    this.highest = highest.reduce((sum, each) => sum + each, 0) / starts.length;
+  /**
+   * @param {Task} task
+   * @param {number[][]} starts the states.
+   * @param {number} highest the mean of the highest returns from the starts.
+   */
+  constructor(task, starts, highest) {
+    Object.assign(this, { task, starts, highest });
   }
 
   /** Returns the regret of a network. All episodes advance together, because batches are faster. */

@@ -79,5 +79,3 @@ async function measureTimes(recorded, controls) {
   const unit = (updates * secondsPerUpdate) / products(settings.hidden_units);
   controls.showTimes((units) => unit * products(units));
 }
-
-if (window.pendulum) startLearning(window.pendulum.page);

@@ -16,9 +16,9 @@ class WorkerMethods {
     const source = new Random(settings.seed, 3);
     Math.random = () => source.next();
     this.task = new Task(recorded);
-    const { action_count: count, starts } = recorded.learning;
+    const { action_count: count, starts, highest_return: highest } = recorded.learning;
     this.trainer = new Trainer(this.task, settings, count);
-    this.regret = new GreedyRegret(this.task, new Optimum(recorded.optimum, this.task), starts);
+    this.regret = new GreedyRegret(this.task, starts, highest);
     return { sizes: this.trainer.network.sizes };
   }
 

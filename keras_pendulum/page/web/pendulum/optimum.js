@@ -8,15 +8,14 @@ const LARGEST_DISCOUNT = 0.995; // a larger one needs thousands of sweeps
 /** The optimum: greedy on a table of the optimal value, as keras_pendulum/optimum describes it. */
 class Optimum {
   /**
-   * @param {{rows: number, columns: number, scale: number, table: string}} recorded the roots of
-   *   the negative values in units of `scale`, as base64 of uint16: rows are θ̇ from -8 to 8 rad/s,
-   *   columns θ from -π to 0.
+   * @param {{rows: number, columns: number, scale: number, table: Uint16Array}} recorded the roots
+   *   of the negative values in units of `scale`: rows are θ̇ from -8 to 8 rad/s, columns θ from -π
+   *   to 0.
    */
   constructor({ rows, columns, scale, table }, task) {
     Object.assign(this, { rows, columns, task });
-    const roots = new Uint16Array(decodedBytes(table).buffer); // little-endian
-    if (roots.length !== rows * columns) throw new Error("its table of the optimum has a wrong size");
-    this.values = Float32Array.from(roots, (root) => -((root * scale) ** 2));
+    if (table.length !== rows * columns) throw new Error("its table of the optimum has a wrong size");
+    this.values = Float32Array.from(table, (root) => -((root * scale) ** 2));
   }
 
   /** Returns the optimal return of 200 steps from a state, interpolated in the table. */

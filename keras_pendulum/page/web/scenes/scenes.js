@@ -55,5 +55,3 @@ class Scenes {
     scrollTo(0, 0);
   }
 }
-
-if (window.pendulum) window.pendulum.scenes = new Scenes(window.pendulum.page);
