@@ -68,6 +68,16 @@ class Backup(NamedTuple):
         return bool((offset - causes @ solution).var() < unexplained * offset.var())
 
     @property
+    def offset_at_zero(self) -> float:
+        """The mean of `offset` where the next observation is nearest to 0, a tenth of the steps.
+
+        For a network that has never learned, it is little: there, its biases alone make the values.
+        """
+        observed = self.next_observation[self.continues.ravel()]
+        distance = np.linalg.norm(observed / observed.std(axis=0), axis=1)
+        return float(self.offset[distance <= np.quantile(distance, 0.1)].mean())
+
+    @property
     def reward_factor(self) -> float:
         """The factor on the rewards with which the values obey the right equation best."""
         rest = self.q - self.future * self.next_q.max(axis=2)

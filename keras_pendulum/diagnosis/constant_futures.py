@@ -94,9 +94,10 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
     small = (
         not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
     )
-    index = small and mean > 0 and not smooth
-    # An index, where batches mix both of them, can be as smooth as large values of such a network.
-    either = small and smooth and mean > 0.2 * size and spread > 0.1 * size
+    # An index, where batches mix both of them, can be as smooth, but it is not small at 0. And its
+    # mix differs from state to state, while the values of such a network may hardly differ.
+    never_learned = declared.offset_at_zero < 0.3 and (smooth or spread < 0.06 * size)
+    index = small and mean > 0 and not never_learned
     for equation in _offset_equations(declared):
         offsets = {
             "no-bootstrapping": none,
@@ -107,10 +108,8 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
         name = equation.variant or equation.name
         share = max(equation.share, 0.6)
         equation = replace(equation, offset=offsets[name], largest_error=1.6, share=share)
-        if name == "frozen-target" and either:
-            equation = _frozen_or_index(equation)
         if name == "index-for-value":  # values that are nearly the same have large errors
-            equation = replace(equation, largest_error=2.2, share=0.3)
+            equation = replace(equation, largest_error=3.0, share=0.3)
         yield _highest_everywhere(equation) if name == "batch-max" else equation
     lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
     yield replace(
@@ -119,20 +118,6 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
         target=lambda b: b.q / (b.q / b.right).sum(axis=1, keepdims=True),
         share=0.35,
         offset=lowest < 0.9 * size and highest > 2.5 * size,
-    )
-
-
-def _frozen_or_index(equation: Equation) -> Equation:
-    """Returns `frozen-target` where an index in place of a value can explain the values as well."""
-    return replace(
-        equation,
-        variant="frozen-target or index-for-value",
-        formula="r + a number between 0 and γ",
-        explanation="The values are the rewards of one step plus a number that changes slowly with "
-        "the next state. It is γ·max of a network that never learns, because the target network is "
-        "never copied, or the index of the best next action, which argmax returns.",
-        remedy="Copy the online weights into the target network, every 100 to 1000 updates or a "
-        "little at each one. And use max in the target; argmax is for acting.",
     )
 
 

@@ -92,7 +92,9 @@ def first(values: Any, **options: Any) -> str:
         ("wrong-target (index-for-value)", constant_values(0.8)),
         ("wrong-target (frozen-target)", frozen_values(0.1, 0.05)),
         ("wrong-target (frozen-target)", frozen_values(0.0, 0.05)),
-        ("wrong-target (frozen-target or index-for-value)", frozen_values(0.5, 0.4)),
+        ("wrong-target (frozen-target)", frozen_values(0.1, 0.4)),
+        ("wrong-target (frozen-target)", constant_values(0.15)),
+        ("wrong-target (index-for-value)", frozen_values(0.5, 0.4)),  # not small at 0
         ("wrong-loss (zero-others)", values_with_zeros),
         ("broken-network", lambda o: np.full((len(o), 2), np.nan)),
     ],
