@@ -54,6 +54,13 @@ COMMANDS = (
     Command("learning.finer_torques", 5, results=("finer_torques",)),
     Command("learning.training_curves", 3, results=("training_curves",)),
     Command(
+        "learning.example_programs",
+        10,
+        ("2", PYTHON),
+        ("example_programs",),
+        ("psutil", "stable_baselines3"),
+    ),
+    Command(
         "learning.reference_beside_libraries",
         15,
         ("reference", "5", PYTHON),

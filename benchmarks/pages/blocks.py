@@ -39,6 +39,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     "falls of CartPole": lambda: markdown(rows_of("cartpole_falls")),
     "speed of CartPole": code_blocks.cartpole_speed,
     "speeds": code_blocks.speeds,
+    "example programs": lambda: markdown(rows_of("example_programs")),
     "training curves": lambda: markdown(rows_of("training_curves")),
     "finer torques": code_blocks.finer_torques,
     "tests of the files": code_blocks.file_tests,
