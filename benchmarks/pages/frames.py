@@ -1,6 +1,6 @@
 """The time between two frames of the page while it learns.
 
-    python -m benchmarks.speed.frames [FRAMES]
+    python -m benchmarks.pages.frames [FRAMES]
 
 Trains in the page as fast as it can, one network and a healthy beside a faulty one, and takes the
 times of 900 frames of each. 16.7 ms are 60 frames per second. It needs Chromium and its
@@ -54,7 +54,7 @@ def main(frames: int = 900) -> None:
                     "longest": round(longest, 1),
                 }
             )
-    write("frames", "python -m benchmarks.speed.frames", rows)
+    write("frames", "python -m benchmarks.pages.frames", rows)
 
 
 if __name__ == "__main__":
