@@ -94,8 +94,8 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
     small = (
         not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
     )
-    # An index, where batches mix both of them, can be as smooth, but it is not small at 0. And its
-    # mix differs from state to state, while the values of such a network may hardly differ.
+    # What an index adds can be as smooth, where batches mix 0 and 1. But it need not be small at 0,
+    # and it differs from state to state, while the values of such a network may hardly differ.
     never_learned = declared.offset_at_zero < 0.3 and (smooth or spread < 0.06 * size)
     index = small and mean > 0 and not never_learned
     for equation in _offset_equations(declared):

@@ -45,12 +45,12 @@ def curve_styles(names: Sequence[str | None]) -> list[CurveStyle]:
     """Returns the style of each curve. The first one of a preset has that of the preset."""
     taken = {PRESET_STYLES.get(name or "", 0) for name in names}
     others = (index for index in count(1) if index not in taken)
-    seen: set[str] = set()
+    seen: set[str | None] = set()
     styles = []
     for name in names:
-        first = name in PRESET_STYLES and name not in seen
-        styles.append(curve_style(PRESET_STYLES[name] if first and name else next(others)))
-        seen.add(name or "")
+        own = None if name in seen else PRESET_STYLES.get(name or "")
+        styles.append(curve_style(next(others) if own is None else own))
+        seen.add(name)
     return styles
 
 

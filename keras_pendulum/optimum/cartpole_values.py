@@ -32,8 +32,7 @@ from keras_pendulum.optimum.cartpole_dynamics import (
 from keras_pendulum.optimum.stored_results import (
     cache_file,
     join_words,
-    read_arrays,
-    shipped_file,
+    shipped_or_cached,
     split_words,
     write_arrays_to_cache,
 )
@@ -59,13 +58,12 @@ def cartpole_value(discount: float) -> Table:
     """
     discount = Number(0, 1).validate("discount", discount) + 0.0  # -0.0 becomes 0.0
     name = file_name(discount)
-    cache = cache_file(name)
-    for file in (shipped_file(name), cache):
-        if (table := _unpack(read_arrays(file), discount)) is not None:
-            return table
+    found = shipped_or_cached(name, lambda arrays: _unpack(arrays, discount))
+    if found is not None:
+        return found
     _log.warning("Computing the exact values of CartPole for γ = %g, once: about 10 s", discount)
     table = solve_cartpole(discount)
-    write_arrays_to_cache(cache, pack(table))
+    write_arrays_to_cache(cache_file(name), pack(table))
     return table
 
 

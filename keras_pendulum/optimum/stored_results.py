@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ from keras_pendulum.environments.pendulum import (
 )
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.atomic_write import write_atomically
+
+Result = TypeVar("Result")
 
 
 class Problem(NamedTuple):
@@ -114,6 +117,19 @@ def cache_file(name: str) -> Path | None:
     except RuntimeError:
         return None
     return Path(base, "keras_pendulum", name)
+
+
+def shipped_or_cached(
+    name: str, unpack: Callable[[dict[str, NDArray[Any]]], Result | None]
+) -> Result | None:
+    """Returns what `unpack` makes of a file in the package, or else of one in the cache.
+
+    Returns None where it makes nothing of both.
+    """
+    for path in (shipped_file(name), cache_file(name)):
+        if (found := unpack(read_arrays(path))) is not None:
+            return found
+    return None
 
 
 def write_to_cache(path: Path | None, problem: Problem, **arrays: NDArray[Any]) -> None:

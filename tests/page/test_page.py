@@ -104,13 +104,29 @@ def test_page_sends_no_network_requests(pages: dict[str, str], player: Player) -
     assert "http" not in re.sub(r'"http-equiv"|http-equiv=', "", source).lower()
 
 
-def test_damaged_page_shows_one_line(pages: dict[str, str], player: Player, tmp_path: Path) -> None:
+@pytest.mark.parametrize("part", ["weights", "table"])
+@pytest.mark.parametrize("end", ["first", "last"])
+def test_damaged_page_shows_one_line(
+    part: str, end: str, pages: dict[str, str], player: Player, tmp_path: Path
+) -> None:
     page = Path(pages["small"].removeprefix("file://")).read_text(encoding="utf-8")
-    (tmp_path / "cut.html").write_text(re.sub(r'"weights": "....', '"weights": "', page))
+    first, last = ("....", "") if end == "first" else ("", "....")
+    damaged = re.sub(rf'("{part}": "){first}([^"]+){last}"', r'\1\2"', page)
+    (tmp_path / "cut.html").write_text(damaged, encoding="utf-8")
     player.open((tmp_path / "cut.html").as_uri())
     assert re.fullmatch(
         r"This page is damaged \(.+\): write it again with .+\.", player.text("problem")
     )
+
+
+def test_old_browser_is_told_to_be_too_old(pages: dict[str, str], player: Player) -> None:
+    script = {"source": "delete window.DecompressionStream"}
+    added = player.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
+    try:
+        player.open(pages["small"])
+        assert player.text("problem").startswith("This browser is too old for this page")
+    finally:
+        player.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
 
 
 def test_page_describes_its_network(pages: dict[str, str], user: Player) -> None:

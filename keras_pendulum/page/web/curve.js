@@ -8,7 +8,10 @@ function curveValue(curve, share) {
   return curve[Math.round(share * (curve.length - 1))];
 }
 
-/** Draws the learning curve in the colour `curve`, dashed lines at `levels`, and a cursor at the episode `here`. */
+/**
+ * Draws the learning curve in the colour `curve`, dashed lines at `levels`, and a cursor at the
+ * episode `here`.
+ */
 function drawCurve(canvas, colours, { curve, levels }, here, end) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = [CURVE_AXIS + HALF_THUMB, width - HALF_THUMB, 5, height - 5];

@@ -33,8 +33,9 @@ async function start() {
     startLearning(page);
     if (typeof Scenes === "function") window.pendulum.scenes = new Scenes(page);
   } catch (error) {
-    element("problem").textContent =
-      `This page is damaged (${error.message}): write it again with python -m keras_pendulum.page.`;
+    element("problem").textContent = window.DecompressionStream
+      ? `This page is damaged (${error.message}): write it again with python -m keras_pendulum.page.`
+      : "This browser is too old for this page: it needs one of 2023 or later.";
     element("problem").hidden = false;
   }
 }
