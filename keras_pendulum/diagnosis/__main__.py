@@ -49,7 +49,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "--discount",
         type=float,
         metavar="γ",
-        help="discount [recorded in the file, else 0.9, and 0.99 for CartPole]",
+        help="discount [recorded in the file, else shown by the values, else 0.9; 0.99 for "
+        "CartPole]",
     )
     add_torques_flag(parser)
     parser.add_argument(

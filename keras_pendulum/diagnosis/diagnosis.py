@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum.config.fields import Number
+from keras_pendulum.diagnosis.equation_rules import shown_discount
 from keras_pendulum.diagnosis.faults import Finding
 from keras_pendulum.diagnosis.findings import find, find_in_record
 from keras_pendulum.diagnosis.measurement import STARTS, Measurement
@@ -171,8 +172,8 @@ def diagnose(
         environment: as in `evaluate_policy`.
         gravity: declared g in m/s²; None takes the recorded one, else the better one of 10 and 1,
             and the summary says so.
-        discount: declared γ; None takes the recorded one, else 0.9 (0.99 for CartPole), and the
-            summary says so.
+        discount: declared γ; None takes the recorded one, else the one that the values show, else
+            0.9 (0.99 for CartPole), and the summary says so.
         torques: N·m of the outputs, as in `evaluate_policy`.
         reward_scale: declared factor on the rewards; None takes the recorded one, else 1.
         record: a `kp.Recorder` that was around the environment during the training, or the path of
@@ -213,13 +214,9 @@ def diagnose(
     else:
         run = read_record(folder)
     sentences = [assumption] if assumption else []
-    if discount is None and (discount := policy.info.discount) is None:
-        discount = task.usual_discount
-        sentences.append(
-            f"The agent records no discount. {discount:g} was assumed: declare yours with "
-            "discount= (--discount)"
-        )
-    discount = Number(0, 1).validate("discount", discount)
+    declared = policy.info.discount if discount is None else discount
+    if declared is not None:
+        Number(0, 1).validate("discount", declared)
     if reward_scale is None:
         reward_scale = policy.info.reward_scale
     reward_scale = Number(1e-6, 1e6).validate("reward_scale", reward_scale)
@@ -231,7 +228,17 @@ def diagnose(
         played += count
         on_progress(min(1.0, played / total))
 
-    measurement = Measurement(policy, task, discount, reward_scale, run, starts, report)
+    gamma = task.usual_discount if declared is None else declared
+    measurement = Measurement(policy, task, gamma, reward_scale, run, starts, report)
+    if declared is None:
+        if (shown := shown_discount(measurement)) is None:
+            reason = f"{gamma:g} was assumed"
+        else:
+            reason = f"Its values fit {shown:g} better than {gamma:g}, so this was assumed"
+            measurement = replace(measurement, discount=shown)
+        sentences.append(
+            f"The agent records no discount. {reason}: declare yours with discount= (--discount)"
+        )
     return replace(diagnose_measurement(measurement), assumptions=sentences)
 
 

@@ -33,6 +33,7 @@ class Equation:
     offset: bool = False  # whether it has no next values, and Q - r is as it says
     change: dict[str, Any] | None = None  # arguments of `Visited.backup`
     label: str = ""  # what differs from the declared task
+    discount: float | None = None  # γ, where it differs
 
     def explains(self, own: Agreement, right: Agreement, ends: bool = False) -> bool:
         """Returns whether the network obeys this equation clearly better than the right one.

@@ -1,13 +1,15 @@
 """The rules that ask which equation the values obey.
 
-Each returns a finding, or None. `findings` says where the limits come from.
+Each rule returns a finding, or None. `findings` says where the limits come from.
 """
 
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 from keras_pendulum.diagnosis import comparisons, repairs
+from keras_pendulum.diagnosis.backup import Agreement
 from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
@@ -22,6 +24,33 @@ _HEALTHY = f"{RIGHT} to 1 to 7 %"
 
 def wrong_equation(m: Measurement) -> Finding | None:
     """Finds another equation that the values obey clearly better than the right one."""
+    if (found := _obeyed_equation(m)) is None:
+        return None
+    right, own, equation = m.right_agreement, found.agreement, found.equation
+    evidence = f"the values satisfy {equation.formula} to {_percent(own.error)} and {RIGHT} to "
+    evidence += _percent(right.error)
+    text = Fault(equation.explanation, equation.remedy) if equation.explanation else None
+    return Finding(
+        equation.name, evidence, _HEALTHY, found.repair, equation.variant, text, found.proven
+    )
+
+
+def shown_discount(m: Measurement) -> float | None:
+    """Returns another γ than the declared one, if the values obey no equation better than its."""
+    if not (m.policy.has_q_values and m.finite):
+        return None
+    found = _obeyed_equation(m)
+    return None if found is None else found.equation.discount
+
+
+class _Obeyed(NamedTuple):
+    agreement: Agreement
+    equation: Equation
+    repair: Repair | None
+    proven: bool
+
+
+def _obeyed_equation(m: Measurement) -> _Obeyed | None:
     right = m.right_agreement
     if m.excess > _DIVERGED or right.error < _RIGHT_ERROR:
         return None
@@ -55,10 +84,7 @@ def wrong_equation(m: Measurement) -> Finding | None:
         )
         if repair is not None and repair.won < 0.5 * m.avoidable_regret and not proven:
             continue  # another equation may explain the values as well
-        evidence = f"the values satisfy {equation.formula} to {_percent(own.error)} and {RIGHT} to "
-        evidence += _percent(right.error)
-        text = Fault(equation.explanation, equation.remedy) if equation.explanation else None
-        return Finding(equation.name, evidence, _HEALTHY, repair, equation.variant, text, proven)
+        return _Obeyed(own, equation, repair, proven)
     return None
 
 

@@ -70,6 +70,7 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
                 partial(_discounted, discount),
                 largest_error=0.07,
                 share=0.4,
+                discount=discount,
             )
     error = declared.q - declared.right
     # Values that are above their targets everywhere are still falling, from about 0.

@@ -71,6 +71,23 @@ def test_solution_of_the_right_equation_has_no_finding() -> None:
     assert diagnosis.measurement.right_agreement.error < 0.03
 
 
+@pytest.mark.parametrize(("discount", "assumed"), [(0.5, 0.5), (0.89, 0.9), (0.95, 0.95)])
+def test_undeclared_discount_is_that_of_the_values(discount: float, assumed: float) -> None:
+    values = fixed_point(lambda r, following, own: r + discount * following.max(axis=2))
+    diagnosis = diagnose(values, discount=None)
+    assert diagnosis.measurement.discount == assumed
+    assert first(diagnosis) == "no finding"
+    note = f"Its values fit {assumed:g} better than 0.9, so this was assumed: declare"
+    assert (note in "".join(diagnosis.assumptions)) == (assumed != 0.9)
+    assert first(diagnose(values, discount=0.7)) == "other-discount"  # it is not as declared
+
+
+def test_discount_that_the_values_do_not_show_is_the_usual_one() -> None:
+    diagnosis = diagnose(fixed_point(TARGETS["wrong-target (mean-next)"]), discount=None)
+    assert first(diagnosis) == "wrong-target (mean-next)"
+    assert "records no discount. 0.9 was assumed" in diagnosis.assumptions[-1]
+
+
 @pytest.mark.parametrize("sweeps", [2, 5, 10, 20, 40])
 def test_right_program_that_has_not_converged_is_not_blamed(sweeps: int) -> None:
     assert first(diagnose(fixed_point(right, sweeps))) in ("not-converged", "no finding")

@@ -24,13 +24,10 @@ from keras_pendulum.train.checkpoint import load_checkpoint
 CONFIG = kp.preset("original", episodes=3, **SHORT)
 
 
-@pytest.mark.parametrize(
-    "name", ["original", "walkthrough", "reference", "cartpole-original", "cartpole"]
-)
+# The other presets: test_checkpoint.py compares two runs of each.
+@pytest.mark.parametrize("name", ["walkthrough", "swingup"])
 def test_equal_seeds_give_runs_that_are_equal_bit_for_bit(name: str) -> None:
-    config = kp.preset(name, episodes=12)
-    if config.train_frequency == "episode":
-        config = config.change(warmup_episodes=9)
+    config = kp.preset(name, episodes=12, warmup_episodes=9, hidden_units=(8,))
     first = kp.train_dqn(config)
     assert first.history[-1].updates > 0
     assert_same(kp.train_dqn(config), first)
