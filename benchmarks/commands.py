@@ -69,7 +69,7 @@ COMMANDS = (
     ),
     Command(
         "learning.reference_beside_libraries",
-        20,
+        30,
         ("swingup", "3", PYTHON),
         ("learning_swingup",),
         ("psutil", "stable_baselines3"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from benchmarks.commands import COMMANDS, hours
-from benchmarks.result_files import RESULTS, ROOT, Row, machine_of, markdown, rows_of
+from benchmarks.result_files import ROOT, Row, machine_of, markdown, rows_of
 
 LAST_REGRET = "last_regret_reference"
 DQN_FILES = (
@@ -58,8 +58,7 @@ def speeds() -> str:
         f"takes {step['bare'].split(' (')[0]}.",
     )
     bullets = "".join(f"- {line}\n" for line in lines)
-    measured = (RESULTS / "learning_swingup.json").exists()
-    return bullets + (swingup_beside(rows_of("learning_swingup")) if measured else "")
+    return bullets + swingup_beside(rows_of("learning_swingup"))
 
 
 def swingup_beside(rows: list[Row]) -> str:
