@@ -131,6 +131,7 @@ class Agreement(NamedTuple):
     correlation: float  # of the advantages of Q with those of the target
     advantages: float  # spread of the advantages of Q, over that of the right targets
     position: float  # of Q on the way from the right targets, 0, to these, 1
+    mean: float = 0.0  # of Q
     at_ends: float = 0.0  # mean of Q where the step ends the episode, as a share of the mean
 
 
@@ -144,5 +145,6 @@ def agreement(values: Backup, target: Array) -> Agreement:
         line_fit(advantages(values.q), advantages(target)).correlation,
         float(learned / max(right, 1e-12)),
         float((way * error).sum() / max((way**2).sum(), 1e-12)),
+        float(values.q.mean()),
         float(values.q[~values.continues].mean() / values.q.mean()) if has_ends else 0.0,
     )

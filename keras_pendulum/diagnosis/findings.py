@@ -27,6 +27,7 @@ RULES: tuple[Callable[[Measurement], Finding | None], ...] = (
     transition_rules.stored_transitions,
     run_rules.old_state,
     output_rules.bounded_output,
+    output_rules.lowest_mean,
     output_rules.batch_broadcast,
     output_rules.same_everywhere,
     equation_rules.wrong_equation,

@@ -13,6 +13,9 @@ from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.evaluate.q_policies import DQNPolicy
 
 _WORST_REWARD = -Pendulum.reward_range[0]
+# A pendulum that hangs at rest costs π² a step, and no policy more on average.
+_LOWEST_MEAN_REWARD = -1.3 * np.pi**2
+_SAME_VALUES = 0.01  # spread of values that are the same in all states, as a share of their mean
 _AT_THE_BOUND = 0.3  # share of the outputs; a linear head has none there
 
 
@@ -108,6 +111,16 @@ def same_everywhere(m: Measurement) -> Finding | None:
     return None
 
 
+def lowest_mean(m: Measurement) -> Finding | None:
+    """Finds a network that large rewards have broken: its one value is too low for a mean."""
+    mean, spread = float(m.learned_q.mean()), float(m.learned_q.std())
+    lowest = _LOWEST_MEAN_REWARD / max(1 - m.discount, 0.005)
+    if not m.task.never_terminates or mean > lowest or spread > _SAME_VALUES * -mean:
+        return None
+    evidence = f"values of {mean:.3g} in all states"
+    return Finding("reward-scale", evidence, f"above {lowest:.0f}, as all of their means")
+
+
 def batch_broadcast(m: Measurement) -> Finding | None:
     """Finds values that are the mean target of a batch in all states."""
     values = m.backup.q
@@ -116,7 +129,7 @@ def batch_broadcast(m: Measurement) -> Finding | None:
     if not values.std(axis=0).any() or max(m.units) > 0.99:  # a dead network
         return None
     if m.task.never_terminates:
-        own = spread < 0.3 * m.backup.reward.std() and 0.02 < reward / -_WORST_REWARD < 0.9
+        own = spread < 0.3 * m.backup.reward.std() and _LOWEST_MEAN_REWARD < reward < -0.3
         rewards = f"the rewards by {m.backup.reward.std():.2g}"
     else:  # of the constant reward 1
         own = spread < 0.02 * mean and mean > 1.5 and reward < 0.8

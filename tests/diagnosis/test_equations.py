@@ -116,6 +116,13 @@ def test_equation_needs_a_margin(changes: dict[str, float], explains: bool) -> N
     assert equation.explains(own._replace(**changes), best) is explains
 
 
+@pytest.mark.parametrize(("mean", "explains"), [(-30.0, True), (30.0, False)])
+def test_positive_values_are_of_no_other_task_of_the_pendulum(mean: float, explains: bool) -> None:
+    equation = Equation("observation-map", "", "", lambda b: b.right, change={})
+    own, best = Agreement(0.1, 0.9, 1.0, 0.0, mean), Agreement(0.2, 0.5, 1.0, 0.0)
+    assert equation.explains(own, best) is explains
+
+
 @pytest.mark.parametrize(
     ("advantages", "correlation", "explains"),
     [(0.2, 0.1, True), (0.5, 0.1, False), (0.2, -0.6, False)],

@@ -49,6 +49,7 @@ def test_exact_values_give_no_finding() -> None:
         ("untrained-outputs", untrained_outputs),
         ("not-converged", lambda o: np.tanh(o @ NOISE) + 0.01 * exact_values(o)),
         ("reward-scale", lambda o: 1e-6 * np.tanh(o @ NOISE) + 1e-5 * exact_values(o)[:, :1]),
+        ("reward-scale", lambda o: -140 + 0.01 * np.tanh(o @ NOISE)),
         ("broken-network", lambda o: np.full((len(o), 41), np.nan)),
         ("broken-network", lambda o: np.full((len(o), 41), -3.0)),
         ("broken-network", lambda o: 1e12 * np.sin(50 * exact_values(o))),
