@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.recorded_steps import Steps, read_steps
+from keras_pendulum.diagnosis.recorded_steps import Steps, plain_array, read_steps
 from keras_pendulum.diagnosis.recorder import Recorder, VectorRecorder
 from keras_pendulum.diagnosis.signals import nearest
 from keras_pendulum.dqn.replay_buffer import Transitions
@@ -28,6 +28,8 @@ def steps_of(record: Any, task: Task) -> Steps:
     Raises TypeError for another object, UserError for a file that a recorder did not write, and
     ConfigError for steps of another environment.
     """
+    while not isinstance(record, Recorder | VectorRecorder) and hasattr(record, "env"):
+        record = record.env  # of a wrapper around the recorder
     if isinstance(record, Recorder | VectorRecorder):
         name, steps = "the recorder", record.steps
     elif isinstance(record, str | os.PathLike):
@@ -55,7 +57,7 @@ def transitions_of(given: Any, task: Task) -> Transitions:
     Args:
         given: five arrays (s, a, r, s′, done), or a list of N such tuples; s and s′ may be [N, D],
             [N, 1, D] or [N, D, 1], the others [N] or [N, 1].
-        task: whose observations they are.
+        task: whose observations they are. Rows of zeros at the end are left out.
 
     Raises ConfigError, with the name of the field, for other arrays, and TypeError for an object
     that is not a sequence.
@@ -74,7 +76,10 @@ def transitions_of(given: Any, task: Task) -> Transitions:
                 f"{size} numbers, in {_FIELDS}"
             )
         arrays.append(array.reshape(rows, size) if size > 1 else array.reshape(rows))
-    observation, action, reward, following, terminated = arrays
+    # A buffer that is not full has rows of zeros behind those that were stored.
+    used = np.flatnonzero(arrays[0].any(axis=1) | arrays[3].any(axis=1))
+    stored = slice(0, used[-1] + 1 if len(used) else rows)
+    observation, action, reward, following, terminated = (array[stored] for array in arrays)
     _require_finite("transitions", observation, action, reward, following, terminated)
     if not np.isin(terminated, (0, 1)).all():
         raise ConfigError("transitions: done has other values than 0 and 1")
@@ -94,25 +99,34 @@ def read_actions(
 
     A torque gets the index of the nearest one of `torques`. Without them, the torques are returned
     in place of the indices. Whole numbers from 0 to A - 1 are indices, unless they are
-    floating-point numbers that are all torques, too.
+    floating-point numbers that are all torques, too. Larger torques are cut, as the pendulum does.
 
-    Raises ConfigError, which begins with `name`, for numbers that are neither.
+    Raises ConfigError, which begins with `name`, for numbers that are neither, and for indices
+    without the torques that they stand for.
     """
     floating = actions.dtype.kind == "f"
+    are_indices = bool((actions == np.floor(actions)).all() and (actions >= 0).all())
     if torques is not None:
-        indices = actions.astype(np.int32)
         closest = nearest(actions, torques)
-        are_indices = (indices == actions).all() and (indices >= 0).all()
         are_torques = floating and np.mean(np.abs(actions - torques[closest]) < 1e-3) >= 0.95
-        if are_indices and not are_torques and indices.max() < len(torques):
-            return indices, None
+        if are_indices and not are_torques and actions.max() < len(torques):
+            return actions.astype(np.int32), None
     are_torques = torques is None or np.abs(torques).max() <= MAX_TORQUE
     if not are_torques:
         raise ConfigError(
             f"{name}: the actions are from {actions.min():g} to {actions.max():g}; expected the "
             "indices 0 and 1"
         )
-    if np.abs(actions).max() > (2 if floating else 1) * MAX_TORQUE:
+    # A program may leave it to the pendulum to cut its torques; an agent with outputs does not.
+    beyond = np.abs(actions).max() > MAX_TORQUE
+    if floating and not are_indices:
+        beyond = torques is not None and np.abs(actions).max() > 2 * MAX_TORQUE
+    if torques is None and are_indices and (beyond or not floating):
+        raise ConfigError(
+            f"{name}: the actions are integers from {actions.min():g} to {actions.max():g}; give "
+            "the torques that these indices stand for (torques=, --torques)"
+        )
+    if beyond or (are_indices and not floating):
         indices_allowed = "" if torques is None else f"indices from 0 to {len(torques) - 1}, or "
         raise ConfigError(
             f"{name}: the actions are from {actions.min():g} to {actions.max():g}; expected "
@@ -144,26 +158,23 @@ def _columns(given: Any, observed: int) -> Sequence[Any]:
 
 def _is_row(item: Any, observed: int) -> bool:
     """Returns whether an item is a tuple (s, a, r, s′, done), not an array of one of them."""
+    if isinstance(item, np.ndarray) and item.dtype == object and item.ndim == 1:
+        item = item.tolist()
     if not isinstance(item, tuple | list) or len(item) != len(Transitions._fields):
         return False
     try:
-        return [np.size(_plain(each)) for each in item] == [observed, 1, 1, observed, 1]
+        return [np.size(plain_array(each)) for each in item] == [observed, 1, 1, observed, 1]
     except ValueError:  # lists of several lengths
         return False
-
-
-def _plain(value: Any) -> Any:
-    """Returns an array of PyTorch or TensorFlow as one of NumPy."""
-    if hasattr(value, "detach"):
-        value = value.detach().cpu()
-    return value.numpy() if hasattr(value, "numpy") else value
 
 
 def _as_array(name: str, column: Any) -> Array:
     try:
         if isinstance(column, list | tuple):
-            column = [_plain(each) for each in column]
-        array = np.asarray(_plain(column))
+            column = [plain_array(each) for each in column]
+        array = np.asarray(plain_array(column))
+        if array.dtype == object:
+            array = np.asarray([plain_array(each) for each in array.tolist()])
     except (TypeError, ValueError):  # such as rows of several lengths
         array = np.empty(0, object)
     if array.dtype.kind not in "fiub" or array.ndim < 1:

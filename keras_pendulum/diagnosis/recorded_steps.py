@@ -36,14 +36,33 @@ class Steps(NamedTuple):
     total: Array  # [] int64: steps of the program, also those before the recorded ones
 
 
+def plain_array(value: Any) -> Any:
+    """Returns a value of PyTorch or TensorFlow as an array of NumPy, and another one as it is."""
+    if hasattr(value, "detach"):
+        value = value.detach().cpu()
+        if value.is_floating_point() and value.itemsize < 4:
+            value = value.float()  # NumPy has no bfloat16
+    return value.numpy() if hasattr(value, "numpy") else value
+
+
 def write_steps(steps: Steps, path: str | os.PathLike[str]) -> None:
     """Writes steps to a file. Raises UserError as `Recorder.save` does."""
     if not len(steps.reward):
         raise UserError("the recorder has no step yet: save it after the training")
     require_no_other_file(Path(path), b"PK", "an .npz file")
+    if Path(path).is_file() and not _holds_steps(path):  # .keras files and others are archives, too
+        raise UserError(f"{path} holds something else than recorded steps: name another file")
     content = io.BytesIO()
     np.savez_compressed(content, **steps._asdict())
     write_atomically(path, content.getvalue())
+
+
+def _holds_steps(path: str | os.PathLike[str]) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {f"{name}.npy" for name in Steps._fields} <= {*archive.namelist()}
+    except (OSError, zipfile.BadZipFile):
+        return False
 
 
 def read_steps(path: str) -> Steps:

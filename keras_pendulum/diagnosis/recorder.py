@@ -8,11 +8,16 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.spaces import Discrete, MultiDiscrete, Space
+from gymnasium.spaces import Box, Discrete, MultiDiscrete, Space
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.recorded_steps import LARGEST_RECORD, Steps, write_steps
+from keras_pendulum.diagnosis.recorded_steps import (
+    LARGEST_RECORD,
+    Steps,
+    plain_array,
+    write_steps,
+)
 from keras_pendulum.errors import ConfigError
 
 _LARGEST_SIZE = 64  # numbers of an observation, and of an action
@@ -27,11 +32,15 @@ class _Ring:
     """The last rows of an environment, or of B environments side by side, in ring arrays.
 
     A row has what a step returned, or the observation of a reset. The observation before a step is
-    that of the row before.
+    that of the row before. `acting` is the space of the actions without wrappers.
     """
 
     def __init__(
-        self, observations: Space[Any], actions: Space[Any], batch: tuple[int, ...] = ()
+        self,
+        observations: Space[Any],
+        actions: Space[Any],
+        acting: Space[Any],
+        batch: tuple[int, ...] = (),
     ) -> None:
         for name, space in (("observations", observations), ("actions", actions)):
             if space.shape is None or math.prod(space.shape[len(batch) :]) > _LARGEST_SIZE:
@@ -50,6 +59,7 @@ class _Ring:
         ]
         # The system gives the memory of a row when it is written.
         self._arrays = [np.zeros((self._capacity, *shape), kind) for shape, kind in columns]
+        self._rescaling = _rescaling(actions, acting)
         self._added = 0
         self.count = 0  # steps of the program
 
@@ -58,9 +68,15 @@ class _Ring:
         i = self._added % self._capacity
         # Without a loop, because this is done at each step.
         observations, actions, rewards, kinds = self._arrays
-        observations[i] = observation
-        actions[i] = action
-        rewards[i] = reward
+        if self._rescaling:
+            action = _rescaled(action, *self._rescaling)
+        try:
+            observations[i] = observation
+            actions[i] = action
+            rewards[i] = reward
+        except Exception:  # what the environment takes and returns may have any shape and type
+            for array, value in zip(self._arrays, (observation, action, reward), strict=False):
+                array[i] = _fitted(value, array[i])
         kinds[i] = kind
         self._added += 1
 
@@ -76,6 +92,34 @@ class _Ring:
         parts = [_steps_of([*each, time]) for each in zip(*columns, strict=True)]
         joined = [np.concatenate(column) for column in zip(*parts, strict=True)]
         return Steps._make([*joined, np.array(self.count)])
+
+
+def _fitted(value: Any, row: Array) -> Any:
+    """Returns a value in the shape of a row; one of another size is NaN, or the index -1."""
+    try:
+        array = np.asarray(plain_array(value))
+        return array.reshape(row.shape).astype(row.dtype)
+    except (TypeError, ValueError, RuntimeError):
+        return np.nan if row.dtype.kind == "f" else -1
+
+
+def _rescaling(actions: Space[Any], acting: Space[Any]) -> tuple[Array, Array] | None:
+    """Returns slope and shift from actions to those that act, where a wrapper rescales them."""
+    if not (isinstance(actions, Box) and isinstance(acting, Box)):
+        return None
+    low, high = (np.asarray(each, np.float64) for each in (actions.low, actions.high))
+    if not np.isfinite(high - low).all() or (high == low).any():
+        return None
+    slope = (acting.high - acting.low) / (high - low)
+    shift = acting.low - slope * low
+    return None if np.allclose(slope, 1) and np.allclose(shift, 0) else (slope, shift)
+
+
+def _rescaled(action: Any, slope: Array, shift: Array) -> Any:
+    try:
+        return np.asarray(plain_array(action)) * slope + shift
+    except (TypeError, ValueError, RuntimeError):
+        return np.nan
 
 
 def _steps_of(columns: list[Array]) -> list[Array]:
@@ -102,10 +146,11 @@ class Recorder(gymnasium.Wrapper[Any, Any, Any, Any]):
     """An environment that records its last 200 000 steps, for `diagnose`.
 
     It changes nothing else. A vector environment is recorded, too: `Recorder(env)` is then a vector
-    environment.
+    environment. Actions that a wrapper rescales are recorded as they act.
 
     Args:
-        env: the environment, as the program uses it: put the recorder around all other wrappers.
+        env: the environment, as the program uses it: put the recorder around all other wrappers,
+            but for those that change the observations.
 
     Raises ConfigError for observations or actions that are not a few numbers.
 
@@ -119,11 +164,16 @@ class Recorder(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def __new__(cls, env: Any = None) -> Any:
         """Returns a recorder, of a vector environment where `env` is one."""
+        if not isinstance(env, gymnasium.Env | VectorEnv | None):
+            raise TypeError(
+                f"env is a {type(env).__name__}; expected an environment of Gymnasium: "
+                'kp.Recorder(gymnasium.make("Pendulum-v1"))'
+            )
         return VectorRecorder(env) if isinstance(env, VectorEnv) else super().__new__(cls)
 
     def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
         super().__init__(env)
-        self._ring = _Ring(env.observation_space, env.action_space)
+        self._ring = _Ring(env.observation_space, env.action_space, env.unwrapped.action_space)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -163,7 +213,10 @@ class VectorRecorder(VectorWrapper[Any, Any, Any, Any, Any]):
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
         super().__init__(env)
-        self._ring = _Ring(env.observation_space, env.action_space, (env.num_envs,))
+        inner = getattr(env.unwrapped, "envs", None)  # those of other processes are not at hand
+        acting = inner[0].unwrapped.action_space if inner else env.unwrapped.single_action_space
+        size = (env.num_envs,)
+        self._ring = _Ring(env.observation_space, env.action_space, acting, size)
         self._mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
         self._resets = np.zeros(env.num_envs, bool)  # whether the next step is a reset
 
@@ -171,8 +224,9 @@ class VectorRecorder(VectorWrapper[Any, Any, Any, Any, Any]):
         self, *, seed: Any = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Resets the environments."""
-        observations, info = self.env.reset(seed=seed, options=options)
+        # Gymnasium removes the mask from the options.
         mask = np.zeros(self.num_envs, bool) | (options or {}).get("reset_mask", True)
+        observations, info = self.env.reset(seed=seed, options=options)
         self._ring.add(observations, 0, 0, np.where(mask, _RESET, _NOTHING))
         self._resets &= ~mask
         return observations, info

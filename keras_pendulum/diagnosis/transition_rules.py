@@ -40,6 +40,8 @@ def _many_ends(m: Measurement, r: RunRecord) -> Finding | None:
     terminal = (r.replay.terminated & ~_ended(m, r)).mean()
     if terminal > 0.2:
         evidence = f"{terminal:.0%} of the stored transitions are ends, and the task goes on there"
+        if terminal > 0.95:
+            evidence += " (if the program stores 1 - done, hand in 1 minus it)"
         return Finding("no-bootstrapping", evidence, "none")
     return None
 

@@ -16,6 +16,9 @@ from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING
 from keras_pendulum.errors import UserError
 
 _TERMINAL_CODE = re.compile(r"\x1b\[[0-9;]{0,9}m")
+_ONE_OUTPUT = (
+    "if it is an actor, whose output is a torque, give lambda o: float(model(o[None])[0, 0])"
+)
 Batch = tuple[int, ...]  # (B,) for observations [B, 3], () for one observation [3]
 
 
@@ -90,7 +93,9 @@ def q_values_of(answer: Any, batch: int, count: int | None = None) -> NDArray[An
     """
     expected = f"expected Q-values of the shape [{batch}, {count or 'number of torques'}]"
     values = _array(answer, expected)
-    if values.shape != (batch, count or values.size // batch) or values.shape[1] < 2:
+    if values.shape == (batch, 1):
+        raise _wrong("one number for each observation", f"{expected}; {_ONE_OUTPUT}")
+    if values.shape != (batch, count or values.size // batch):
         raise _wrong(f"an array of the shape {list(values.shape)}", expected)
     return values
 

@@ -97,14 +97,19 @@ def _policy_of(source: Any, torques: ArrayLike | None, name: str | None) -> Poli
             return QPolicy(lambda x: call(x[:, np.newaxis]), torques, name or source.name)
         return QPolicy(call, torques, name or source.name)
     if isinstance(source, type):
-        raise TypeError(one_line(f"agent is the class {source.__name__}; {_EXPECTED}"))
+        raise TypeError(
+            one_line(f"agent is the class {source.__name__}: make an object of it; {_EXPECTED}")
+        )
     if has_predict(source):
         return PredictPolicy(source, torques)
-    if is_instance(source, "torch.nn", "Module"):
-        raise TypeError("agent is a PyTorch module; give kp.q_function(module, torques=...)")
     for method in _METHODS:
         if callable(getattr(source, method, None)):
             return FunctionPolicy(getattr(source, method), torques)
+    if is_instance(source, "torch.nn", "Module"):
+        raise TypeError(
+            "agent is a PyTorch module; give kp.q_function(module, torques=...), or of an actor a "
+            "function from an observation to a torque"
+        )
     if not callable(source):
         raise TypeError(one_line(f"agent is {source!r}; {_EXPECTED}"))
     return FunctionPolicy(source, torques)

@@ -93,8 +93,11 @@ class PredictPolicy(FunctionPolicy):
         source: the object.
         torques: N·m, what the indices stand for; None takes `linspace(-2, 2, A)`.
 
-    One that takes four numbers and has two actions is one of CartPole. Raises ConfigError when its
-    spaces are not those of a task.
+    One that takes four numbers and has two actions is one of CartPole. The state that a recurrent
+    one returns is given back to it in the next step of the episode. A model that learned from the
+    observations of Stable-Baselines3's VecNormalize gets them here, too.
+
+    Raises ConfigError when its spaces are not those of a task.
     """
 
     def __init__(self, source: Any, torques: ArrayLike | None) -> None:
@@ -121,18 +124,41 @@ class PredictPolicy(FunctionPolicy):
                 f"{self.name} has the actions {space}; expected one torque from -2 to 2 N·m: give "
                 "a function that returns the torque"
             )
-        self.one_by_one = space is None
+        # Of sb3_contrib's RecurrentPPO.
+        recurrent = hasattr(getattr(source, "policy", None), "lstm_actor")
+        self.one_by_one = space is None or recurrent
+        self._takes_state = "state" in inspect.signature(source.predict).parameters
+        self._state: Any = None
+        normalized = getattr(source, "get_vec_normalize_env", lambda: None)()
+        self._seen = (lambda each: each) if normalized is None else normalized.normalize_obs
         self._first = int(getattr(space, "start", 0))
         network: Any = getattr(source, "q_net", None)  # of Stable-Baselines3's DQN
         self.has_q_values = self.actions is not None and is_instance(network, "torch.nn", "Module")
-        if self.has_q_values:
-            self.q_values = q_function(network, torques).q_values  # type: ignore[method-assign]
+        self._values = q_function(network, torques).q_values if self.has_q_values else None
+
+    def q_values(self, observations: ArrayLike) -> NDArray[Any]:
+        """Returns the Q-values of Stable-Baselines3's DQN."""
+        if self._values is None:
+            return super().q_values(observations)
+        return self._values(self._seen(np.asarray(observations, np.float32)))
+
+    def reset(self) -> None:
+        """Starts a new episode."""
+        self._state = None
 
     def _actions(self, observations: Observations) -> NDArray[Any]:
-        answer = call_agent(self._source.predict, observations, deterministic=True)
+        options = {} if self._state is None else {"state": self._state}
+        seen = self._seen(observations)
+        answer = call_agent(self._source.predict, seen, deterministic=True, **options)
         if not isinstance(answer, tuple) or not answer:
             raise ActionError(
                 f"predict returned a {name_of(type(answer))}; expected a pair (action, state)"
+            )
+        self._state = answer[1] if len(answer) > 1 and self._takes_state else None
+        if self._state is not None and not self.one_by_one:
+            raise ActionError(
+                "predict returned a state, as a recurrent agent does; give a function of one "
+                "observation that keeps it"
             )
         return self._read(answer[0], observations.shape[:-1])
 

@@ -111,7 +111,10 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
     _require_moderate_values(layers, activation or "linear", path)
     outputs = layers[-1].bias.shape[0]
     if outputs < 2:
-        raise WeightsError(f"{path}: the network has one output; expected one for each action")
+        raise WeightsError(
+            f"{path}: the network has one output; expected one for each action. An actor, whose "
+            "output is a torque, is a function in your program: mine.py:act"
+        )
     actions = task.action_count(outputs)
     if actions != outputs:
         raise WeightsError(

@@ -85,6 +85,13 @@ LAYOUTS: dict[str, Callable[[Any], Any]] = {
         tuple(torch.from_numpy(np.asarray(each)) for each in row) for row in zip(*b, strict=True)
     ],
     "float indices": lambda b: (b[0], b[1].astype(np.float32), *b[2:4], b[4].astype(np.float32)),
+    "not full": lambda b: [np.concatenate([each, 0 * each[:500]]) for each in b],
+    "columns of objects": lambda b: [np.array([*each, None], object)[:-1] for each in b],
+    "rows of objects": lambda b: np.array([(*row,) for row in zip(*b, strict=True)], object),
+    "rows of bfloat16": lambda b: [
+        (s, a, r, n, torch.tensor(float(d), dtype=torch.bfloat16))
+        for s, a, r, n, d in zip(*b, strict=True)
+    ],
     "torques": lambda b: (b[0], TORQUES[b[1]].astype(np.float32), *b[2:]),
 }
 
@@ -126,7 +133,7 @@ def broken(run: Any, place: int, value: Any) -> list[Any]:
         (lambda run: broken(run, 1, np.full(3000, 41)), "the actions are from 41 to 41; .*0 to 40"),
         (lambda run: broken(run, 1, np.full(3000, 9.5)), "from 9.5 to 9.5; expected indices"),
         (lambda run: broken(run, 4, np.full(3000, 0.5)), "done has other values than 0 and 1"),
-        (lambda run: broken(run, 0, 0.5 * buffer_of(run)[0]), r"cos² \+ sin² is 0.25, not 1"),
+        (lambda run: broken(run, 0, 0.5 * buffer_of(run)[0]), r"100% .* not 1, such as 0.25"),
     ],
 )
 def test_wrong_transitions_are_refused_in_one_line(change: Any, message: str, run: Any) -> None:
@@ -344,3 +351,26 @@ def test_run_folder_has_a_record_of_its_own(run: Any, tmp_path: Path) -> None:
     kp.train_dqn(config, tmp_path / "run")
     with pytest.raises(kp.ConfigError, match="is a run folder, which has a record of its own"):
         kp.diagnose(tmp_path / "run", record=run)
+
+
+@pytest.mark.parametrize("actions", [[0, 1, 2], [0, 1, 0], [0.0, 3.0, 4.0]])
+def test_indices_need_the_torques_that_they_stand_for(actions: Any) -> None:
+    with pytest.raises(kp.ConfigError, match=r"integers from 0 to \d; give the torques .*torques="):
+        read_actions(np.array(actions), None, "record")
+
+
+@pytest.mark.parametrize(
+    ("actions", "torques"),
+    [([-1, 0, 2], [-1, 0, 2]), ([0.0, 1.0, 2.0], [0, 1, 2]), ([-11.5, 0.5, 9.0], [-2, 0.5, 2])],
+)
+def test_torques_of_a_program_are_cut_as_the_pendulum_does(actions: Any, torques: Any) -> None:
+    found, torque = read_actions(np.array(actions), None, "record")
+    assert torque is not None and found.tolist() == torque.tolist() == torques
+
+
+def test_ends_that_may_be_a_mask_are_said_to_be(run: Any) -> None:
+    measured = measure(
+        bad_values, make_record(None, broken(run, 4, np.ones(3000)), TORQUES, PENDULUM)
+    )
+    finding = transition_rules.stored_transitions(measured)
+    assert finding is not None and "1 - done" in finding.evidence

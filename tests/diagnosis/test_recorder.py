@@ -11,8 +11,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import torch
 from gymnasium.envs.classic_control import PendulumEnv
 from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import ClipAction, RescaleAction
 from recorded_runs import record_run
 
 import keras_pendulum as kp
@@ -242,3 +244,108 @@ def test_missing_files_pipes_and_other_objects_are_refused(tmp_path: Path) -> No
     play(cartpole, [0, 1])
     with pytest.raises(kp.ConfigError, match="observations of 4 numbers"):
         steps_of(cartpole, Pendulum())
+
+
+class Discretised(gymnasium.ActionWrapper[Any, Any, Any]):
+    """Takes an index of three torques, as a number or as an array of one."""
+
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        super().__init__(env)
+        self.action_space = gymnasium.spaces.Discrete(3)
+
+    def action(self, action: Any) -> Any:
+        return np.atleast_1d(np.array([-2.0, 0.0, 2.0])[action])
+
+
+class ArrayReward(gymnasium.RewardWrapper[Any, Any]):
+    def reward(self, reward: Any) -> Any:
+        return np.array([reward])
+
+
+def rescaled(env: Any, low: float, high: float) -> gymnasium.Env[Any, Any]:
+    return RescaleAction(env, np.float32(low), np.float32(high))
+
+
+def pendulum() -> gymnasium.Env[Any, Any]:
+    return gymnasium.make("Pendulum-v1", disable_env_checker=True)
+
+
+@pytest.mark.parametrize(
+    ("env", "action", "recorded"),
+    [
+        (Discretised(pendulum()), 2, 2),
+        (Discretised(pendulum()), np.array([2]), 2),
+        (Discretised(pendulum()), torch.tensor([2]), 2),
+        (pendulum(), np.array([[0.5]]), 0.5),  # its observations are [3, 1]
+        (ArrayReward(pendulum()), [0.5], 0.5),
+        (rescaled(pendulum(), -1, 1), np.array([0.5], np.float32), 1.0),
+        (rescaled(pendulum(), 0, 10), np.array([0.0], np.float32), -2.0),
+        (ClipAction(pendulum()), [0.5], 0.5),
+    ],
+)
+def test_recorder_takes_what_the_environment_takes(env: Any, action: Any, recorded: float) -> None:
+    recorder = kp.Recorder(env)
+    observation, _ = recorder.reset(seed=0)
+    following, reward, *_ = recorder.step(action)
+    steps = recorder.steps
+    assert steps.action.tolist() == [recorded]
+    assert steps.observation[0].tolist() == observation.tolist()
+    assert steps.next_observation[0].tolist() == np.ravel(following).tolist()
+    assert steps.reward == pytest.approx(np.ravel(reward))
+
+
+def test_recorder_never_ends_a_program() -> None:
+    class Odd(gymnasium.ObservationWrapper[Any, Any, Any]):
+        def observation(self, observation: Any) -> Any:
+            return np.zeros(7)
+
+    env = kp.Recorder(Odd(gymnasium.make("Pendulum-v1")))
+    env.reset(seed=0)
+    env.step([0.0])
+    assert np.isnan(env.steps.observation).all()
+
+
+def test_actions_of_a_vector_environment_are_recorded_as_they_act() -> None:
+    wrapped: Any = [lambda env: rescaled(env, -1, 1)]
+    envs: Any = gymnasium.make_vec("Pendulum-v1", 2, wrappers=wrapped)
+    env = kp.Recorder(envs)
+    env.reset(seed=0)
+    env.step(np.array([[0.5], [-1.0]], np.float32))
+    assert env.steps.action.tolist() == [1.0, -2.0]
+
+
+def test_reset_of_some_environments_begins_an_episode_of_these() -> None:
+    envs: Any = gymnasium.make_vec(
+        "CartPole-v1", 3, "sync", vector_kwargs={"autoreset_mode": AutoresetMode.DISABLED}
+    )
+    env: Any = kp.Recorder(envs)
+    env.reset(seed=0)
+    resets = 3
+    for step in range(100):
+        *_, ended, _, _ = env.step(np.array([0, 1, step % 2]))
+        if ended.any():
+            env.reset(options={"reset_mask": ended})
+            resets += ended.sum() if step < 99 else 0
+    assert resets > 20
+    assert env.steps.first.sum() == resets
+
+
+@pytest.mark.parametrize("other", ["Pendulum-v1", object()])
+def test_recorder_needs_an_environment(other: Any) -> None:
+    with pytest.raises(TypeError, match=r"expected an environment of Gymnasium: kp.Recorder\(gym"):
+        kp.Recorder(other)
+
+
+def test_recorder_is_found_below_other_wrappers() -> None:
+    env = record_run(episodes=2, steps=5)
+    assert len(steps_of(gymnasium.wrappers.TimeLimit(env, 50), Pendulum()).reward) == 10
+
+
+def test_archive_of_another_program_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "mine.keras"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("config.json", "{}")
+    before = path.read_bytes()
+    with pytest.raises(kp.UserError, match="holds something else than recorded steps"):
+        record_run(episodes=1, steps=5).save(path)
+    assert path.read_bytes() == before

@@ -338,7 +338,7 @@ def test_answer_that_is_no_index_is_refused(answer: Any, problem: str) -> None:
     [
         (lambda x: x[:, 0], r"an array of the shape \[2\]; expected Q-values of the shape \[2, "),
         (lambda x: x[:1], r"an array of the shape \[1, 3\]"),
-        (lambda x: x[:, :1], r"an array of the shape \[2, 1\]"),
+        (lambda x: x[:, :1], r"one number for each observation; .* actor, .* give lambda o: "),
         (lambda x: {"q": x}, "a dict of the type object"),
         (lambda x: x.missing, r"raised AttributeError: .*missing.* \(test_agents.py, line \d+\)$"),
     ],
@@ -412,3 +412,51 @@ def test_model_of_a_class_of_ones_own_is_not_compiled() -> None:
     calls.clear()
     kp.evaluate_policy(model, episodes=1, gravity=1)
     assert len(calls) >= 200
+
+
+class Recurrent:
+    """Pushes with 1 N·m, and from the second step of an episode on with 2."""
+
+    def predict(
+        self, observation: Any, state: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        return np.array([1.0 if state is None else 2.0]), 1
+
+
+def test_state_of_predict_is_kept_until_the_end_of_the_episode() -> None:
+    policy = as_policy(Recurrent())
+    assert policy.one_by_one
+    assert [policy.act(OBSERVATIONS[:1]).item() for _ in range(3)] == [1, 2, 2]
+    policy.reset()
+    assert policy.act(OBSERVATIONS[:1]).item() == 1
+
+
+def test_state_of_a_batch_is_refused() -> None:
+    model = with_spaces(
+        predict=lambda self, observation, state=None, deterministic=True: (
+            np.zeros(len(observation), int),
+            np.ones(2),
+        )
+    )
+    with pytest.raises(ActionError, match=r"predict returned a state, .* that keeps it"):
+        as_policy(model).act(OBSERVATIONS)
+
+
+def test_model_gets_the_observations_with_which_it_learned() -> None:
+    class Normalized(Recurrent):
+        def get_vec_normalize_env(self) -> Any:
+            return SimpleNamespace(normalize_obs=lambda each: each / 10)
+
+        def predict(self, observation: Any, deterministic: bool = False) -> Any:  # type: ignore[override]
+            return observation[:1], None
+
+    policy = as_policy(Normalized())
+    assert policy.act(np.array([[1, 0, 0]], np.float32)).item() == pytest.approx(0.1)
+
+
+def test_pytorch_module_with_a_method_of_an_agent_is_one() -> None:
+    class Actor(torch.nn.Module):
+        def act(self, observation: Any) -> float:
+            return 1.5
+
+    assert as_policy(Actor()).act(OBSERVATIONS).tolist() == [[1.5]] * len(OBSERVATIONS)
