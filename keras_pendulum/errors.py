@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LONGEST = 300  # characters of a message
+_TERMINAL_CODE = re.compile(r"\x1b\[[0-9;]{0,9}m")
 
 
 class UserError(Exception):
@@ -79,3 +81,12 @@ def one_line(message: str) -> str:
         return line
     half = LONGEST // 2
     return f"{line[: half - 1]}…{line[-half:]}"
+
+
+def reason_of(error: BaseException) -> str:
+    """Returns the text of an error in one line, as plain as can be.
+
+    Keras prints its reasons in bold, between empty lines, and all arguments behind them.
+    """
+    reason = " ".join(_TERMINAL_CODE.sub("", str(error)).split())
+    return reason.partition(" Arguments received by")[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, reason_of
 
-_TERMINAL_CODE = re.compile(r"\x1b\[[0-9;]{0,9}m")
 _ONE_OUTPUT = (
     "if it is an actor, whose output is a torque, give lambda o: float(model(o[None])[0, 0])"
 )
@@ -44,10 +42,7 @@ def failure(error: BaseException) -> str:
     """Returns what a user's code raised, and where."""
     frame = extract_tb(error.__traceback__)[-1]
     place = f"{Path(frame.filename).name}, line {frame.lineno}"
-    # Keras prints its reasons in bold, between empty lines, and all arguments behind them.
-    reason = " ".join(_TERMINAL_CODE.sub("", str(error)).split())
-    reason = reason.partition(" Arguments received by")[0]
-    return f"raised {type(error).__name__}: {reason} ({place})"
+    return f"raised {type(error).__name__}: {reason_of(error)} ({place})"
 
 
 def torques_of(answer: Any, batch: Batch) -> NDArray[np.float64]:

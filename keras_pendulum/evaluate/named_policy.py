@@ -54,12 +54,19 @@ def names_code(word: str) -> bool:
 
     A file of that very name is not code.
     """
-    return word.endswith(".py") or bool(_CODE.fullmatch(word) and not Path(word).is_file())
+    is_code = bool(_CODE.fullmatch(word)) or ".py:" in word
+    return word.endswith(".py") or (is_code and not Path(word).is_file())
 
 
 def _load_code(word: str) -> Any:
     """Runs the file, or imports the module, and returns the object of that name."""
     form = _CODE.fullmatch(word)
+    file, is_named, code = word.partition(".py:")
+    if form is None and is_named:
+        raise UserError(
+            f"{word}: expected FILE.py:NAME; write `agent = {code or '…'}` in {file}.py, and give "
+            f"{file}.py:agent"
+        )
     if form is None:
         raise UserError(f"{word}: names a file, but no agent in it; expected {word}:NAME")
     place, name = form["place"], form["name"]

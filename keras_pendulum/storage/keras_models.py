@@ -20,7 +20,7 @@ import keras
 import tensorflow as tf
 
 from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import UnknownLayersError, UserError, WeightsError
+from keras_pendulum.errors import UnknownLayersError, UserError, WeightsError, reason_of
 from keras_pendulum.storage.keras_h5 import require_sane
 from keras_pendulum.storage.known_layers import modernised, refuse_model, require_known_layers
 from keras_pendulum.storage.model_config import read_model
@@ -72,7 +72,7 @@ def load_keras_model(path: str | os.PathLike[str]) -> keras.Model:
         except UserError:
             raise
         except Exception as error:  # which one depends on what the file lacks
-            refuse_model(name, f"({type(error).__name__}: {error})")
+            refuse_model(name, f"({type(error).__name__}: {reason_of(error)})")
     return model
 
 

@@ -39,7 +39,8 @@ def load_weights(path: str | os.PathLike[str], activation: str | None = None) ->
     Args:
         path: the file, a run folder, or the name of a shipped file.
         activation: tanh, relu or linear, of the hidden layers, for a file that holds weights alone.
-            Without it, and without a recorded one, they are tanh, with a warning.
+            Without it, and without a recorded one, they are tanh, with a warning. There is one,
+            too, for a model of a class of the user's own: its layers are read as a chain.
 
     Raises WeightsError when the file is missing or damaged, does not hold such a network, or
     records another activation.
@@ -98,6 +99,14 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
             info = replace(info, task=CartPole())
         task = _task(info)
         layers = read_layers(file, path, task.observation_size, model)
+    ours = model is not None and model.get("registered_name") == REGISTERED_NAME
+    if model and not ours and layers[-1].activation is None:
+        warnings.warn(
+            f"{path} is a {model['class_name']}, whose code it does not hold: it is read as a "
+            "chain of its Dense layers. If its call does more, give the agent of your program: "
+            "mine.py:agent",
+            stacklevel=3,
+        )
     activation = attributes.get("activation")
     if layers[-1].activation is not None:  # a whole model records one for each layer
         names = [str(layer.activation) for layer in layers[:-1]]

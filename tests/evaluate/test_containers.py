@@ -253,3 +253,31 @@ def test_long_path_leaves_the_code_whole(tmp_path: Path) -> None:
     save_torch(path)
     with pytest.raises(kp.WeightsError, match=r"torch\.load\('net\.pth', weights_only=True\)"):
         named_policy(str(path))
+
+
+def test_model_of_a_class_of_ones_own_is_read_with_a_warning(tmp_path: Path) -> None:
+    class Scaled(keras.Model):
+        def __init__(self) -> None:
+            super().__init__()
+            self.hidden, self.head = layers.Dense(8, "tanh"), layers.Dense(5)
+
+        def call(self, x: Any) -> Any:
+            return self.head(self.hidden(x / 8))
+
+    model = Scaled()
+    model(OBSERVATIONS)
+    path = tmp_path / "mine.keras"
+    model.save(path)
+    with pytest.warns(UserWarning, match=r"is a Scaled, whose code .* of your program: mine.py:ag"):
+        kp.load_weights(path, "tanh")
+
+
+def test_reason_of_keras_is_one_plain_line(tmp_path: Path) -> None:
+    model = keras.Sequential(
+        [keras.Input((3, 1)), layers.Conv1D(4, 2), layers.Flatten(), layers.Dense(5)]
+    )
+    path = tmp_path / "mine.keras"
+    model.save(path)
+    with pytest.raises(kp.UserError, match=r"give file\.py:name") as caught:
+        kp.evaluate_policy(path, 1)
+    assert "\\x1b" not in str(caught.value) and "\\n" not in str(caught.value)

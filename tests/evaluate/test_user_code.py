@@ -65,6 +65,8 @@ def test_other_objects_in_a_file_are_evaluated(in_process: Command, code: Path) 
 WRONG = [
     (["my agent.py:pusch"], "my agent.py: has no pusch; did you mean push?"),
     (["my agent.py"], "my agent.py: names a file, but no agent in it; expected my agent.py:NAME"),
+    (["mine.py:Agent()"], "write `agent = Agent()` in mine.py, and give mine.py:agent"),
+    (["mine.py:trainer.agent"], "write `agent = trainer.agent` in mine.py, and give mine.py:agent"),
     (["missing.py:push"], "missing.py: no such file; expected FILE.py:NAME"),
     (["missing27.agents:push"], "missing27.agents: no such module; expected PACKAGE.MODULE:NAME"),
     (["my agent.py:number"], "my agent.py:number: agent is 3; expected a DQN"),
@@ -100,7 +102,7 @@ def test_form_of_code() -> None:
         "run/weights.h5": False,
         "C:\\folder\\weights.h5": False,
         "a.py": True,
-        "a.py:2": False,
+        "a.py:2": True,
         "a b:c": False,
     }
     assert {word: names_code(word) for word in forms} == forms
