@@ -123,8 +123,9 @@ def read_actions(
         beyond = torques is not None and np.abs(actions).max() > 2 * MAX_TORQUE
     if torques is None and are_indices and (beyond or not floating):
         raise ConfigError(
-            f"{name}: the actions are integers from {actions.min():g} to {actions.max():g}; give "
-            "the torques that these indices stand for (torques=, --torques)"
+            f"{name}: the actions are indices from {actions.min():g} to {actions.max():g} without "
+            "their torques; give an agent that returns such an index, with torques= (--torques), "
+            "or put the recorder inside the wrapper that maps them to torques"
         )
     if beyond or (are_indices and not floating):
         indices_allowed = "" if torques is None else f"indices from 0 to {len(torques) - 1}, or "
