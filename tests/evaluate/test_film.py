@@ -29,8 +29,6 @@ from keras_pendulum.figures.moment import Moment
 from keras_pendulum.figures.scenes import SCENES, scene
 from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
 
-pytestmark = pytest.mark.quick
-
 TITLES = ("swingup, g = 10 m/s²", "start: hanging")
 HANGING, CART = np.array([-1, 0, 0], np.float32), np.array([0.1, 0, 0.02, 0], np.float32)
 

@@ -13,6 +13,8 @@ import keras_pendulum as kp
 from keras_pendulum.storage.hdf5_reader import copy_content
 from keras_pendulum.train.checkpoint import load_checkpoint
 
+pytestmark = pytest.mark.slow
+
 CONFIG = kp.preset("reference", episodes=1, hidden_units=(16, 8), replay_capacity=1000)
 
 

@@ -12,6 +12,8 @@ from fuzz_files import LAYOUTS, fuzz
 from hostile_files import BY_H5PY, HOSTILE, KERNEL, write, write_sound
 from load_files import Loader, Outcome
 
+pytestmark = pytest.mark.slow
+
 MOST_MEMORY = 60  # MB, and for the reader twice the size of the file
 LONGEST_MESSAGE = 1000  # characters beside the path
 PROCESSOR_TIME = 0.5  # s; the reader of a small file takes 0.02 s after its imports

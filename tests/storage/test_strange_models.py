@@ -17,6 +17,8 @@ import keras_pendulum as kp
 from keras_pendulum.evaluate.sources import load_keras_file
 from keras_pendulum.storage import keras_models
 
+pytestmark = pytest.mark.slow
+
 MOST_MEMORY = 100  # MB
 
 
