@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from typing import Any
 
 import numpy as np
@@ -150,9 +150,11 @@ def _columns(given: Any, observed: int) -> Sequence[Any]:
     if all(_is_row(item, observed) for item in items):
         return [[item[place] for item in items] for place in range(count)]
     if len(items) != count:
+        other = next((item for item in items if not _is_row(item, observed)), None)
+        size = f" of {len(other)}" if isinstance(other, Sized) else ""
         raise ConfigError(
-            f"transitions has {len(items)} items that are not all {_FIELDS}; expected five arrays, "
-            "or a list of such tuples"
+            f"transitions has {len(items)} items that are not all {_FIELDS}, but a "
+            f"{type(other).__name__}{size}; expected five arrays, or a list of such tuples"
         )
     return items
 

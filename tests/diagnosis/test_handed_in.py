@@ -125,7 +125,8 @@ def broken(run: Any, place: int, value: Any) -> list[Any]:
     [
         (lambda run: 3, "transitions is a int; expected .s, a, r, s′, done.: five arrays"),
         (lambda run: [], "transitions has 0 items|transitions is empty"),
-        (lambda run: buffer_of(run)[:4], "transitions has 4 items"),
+        (lambda run: buffer_of(run)[:4], "transitions has 4 items .* but a ndarray of 3000"),
+        (lambda run: [(0,) * 6] * 9, "transitions has 9 items .* but a tuple of 6; expected five"),
         (lambda run: broken(run, 0, np.zeros((3000, 4))), "observation has the shape .3000, 4."),
         (lambda run: broken(run, 2, np.zeros(7)), "reward has the shape .7."),
         (lambda run: broken(run, 1, ["left"] * 3000), "action is not an array of numbers"),
