@@ -156,6 +156,9 @@ MISTAKES: dict[str, Mistake] = {
         "misaligned-transitions", "transitions", "same-state", keeps_first_state=True
     ),
     "index of the next torque stored": _shown("torque-map", "transitions", stores_next_index=True),
+    "a constant added to the rewards": Mistake(
+        {"reward": lambda reward: (reward + 8.1) / 8.1}, "reward-scale"
+    ),
 }
 
 # What differs between two right programs.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.signals import Array, advantages, line_fit
+from keras_pendulum.diagnosis.signals import Array, Fit, advantages, line_fit
 from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.environments.task import Task
 from keras_pendulum.optimum.known_dynamics import KnownDynamics
@@ -76,6 +76,18 @@ class Backup(NamedTuple):
         observed = self.next_observation[self.continues.ravel()]
         distance = np.linalg.norm(observed / observed.std(axis=0), axis=1)
         return float(self.offset[distance <= np.quantile(distance, 0.1)].mean())
+
+    @property
+    def reward_line(self) -> Fit:
+        """The line over the rewards that obeys the right equation best in their place.
+
+        Its correlation is that of the advantages of the values and of their targets.
+        """
+        future = self.future * self.next_q.max(axis=2)
+        line = line_fit(self.q - future, self.reward)
+        target = line.slope * self.reward + line.offset + future
+        correlation = line_fit(advantages(self.q), advantages(target)).correlation
+        return line._replace(correlation=correlation)
 
     @property
     def reward_factor(self) -> float:

@@ -61,6 +61,21 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             largest_error=0.12,
             share=0.75,
         )
+    line = declared.reward_line
+    top = line.offset / max(1 - visited.discount, 0.005)  # the value of rewards that stay 0
+    if line.slope > 0.02 and line.correlation > 0.6 and declared.q.max() > 0.4 * top > 0.5:
+        yield Equation(
+            "reward-scale",
+            "",
+            f"{line.slope:.3g}·r + {line.offset:.3g} + γ·max Q(s′, ·)",
+            lambda b: b.right + (line.slope - 1) * b.reward + line.offset,
+            "A constant is added to the rewards, so all values are higher than possible. In an "
+            "episode that never ends, this changes no decision.",
+            "Leave the constant out, or keep it: it is no reason for a low return here. Train for "
+            "longer, with a learning rate that falls.",
+            largest_error=0.15,
+            share=0.5,
+        )
     for discount in _DISCOUNTS:
         if abs(discount - visited.discount) > 0.25 * (1 - visited.discount):
             yield Equation(

@@ -87,7 +87,7 @@ FAULTS: dict[str, Fault] = {
         "The values are those of rewards with another size. Large ones need larger outputs than "
         "the network reaches in time, and small ones are below the noise of its initial weights.",
         "Scale the rewards so that the values are between 1 and 100 in size.",
-        ("too-few-updates",),
+        ("too-few-updates", "overestimation"),
     ),
     "untrained-outputs": Fault(
         "A few outputs differ from all others in every state, and the maximum picks them. They "

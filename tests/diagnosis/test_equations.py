@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -86,6 +87,20 @@ def test_discount_that_the_values_do_not_show_is_the_usual_one() -> None:
     diagnosis = diagnose(fixed_point(TARGETS["wrong-target (mean-next)"]), discount=None)
     assert first(diagnosis) == "wrong-target (mean-next)"
     assert "records no discount. 0.9 was assumed" in diagnosis.assumptions[-1]
+
+
+@pytest.mark.parametrize(("size", "constant"), [(1 / 8.1, 1.0), (1.0, 8.0), (1 / 16.27, 1.0)])
+def test_constant_that_is_added_to_the_rewards_is_named(size: float, constant: float) -> None:
+    values = fixed_point(lambda r, following, own: right(size * r + constant, following, own))
+    diagnosis = diagnose(values)
+    (note,) = diagnosis.notes
+    assert note.title == "reward-scale"
+    found = re.search(r"satisfy (\S+)·r [+] (\S+) [+] γ·max", note.evidence)
+    assert found is not None
+    assert [float(each) for each in found.groups()] == pytest.approx([size, constant], rel=0.02)
+    assert "changes no decision" in note.explanation
+    worse = diagnose(lambda o: values(o * np.array([1, 1, 0.5])))  # it plays badly
+    assert first(worse) != "wrong-target (index-for-value)"
 
 
 @pytest.mark.parametrize("sweeps", [2, 5, 10, 20, 40])
