@@ -70,6 +70,7 @@ def _check(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
+            warnings.filterwarnings("ignore", ".* whose code it does not hold")
             loaded = kp.load_weights(path, **arguments)
     except kp.WeightsError as error:
         message = str(error)

@@ -216,7 +216,7 @@ def diagnose(
     sentences = [assumption] if assumption else []
     declared = policy.info.discount if discount is None else discount
     if declared is not None:
-        Number(0, 1).validate("discount", declared)
+        declared = Number(0, 1).validate("discount", declared)
     if reward_scale is None:
         reward_scale = policy.info.reward_scale
     reward_scale = Number(1e-6, 1e6).validate("reward_scale", reward_scale)

@@ -61,9 +61,10 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             largest_error=0.12,
             share=0.75,
         )
-    line = declared.reward_line
+    line, goes_on = declared.reward_line, visited.dynamics.task.never_terminates
     top = line.offset / max(1 - visited.discount, 0.005)  # the value of rewards that stay 0
-    if line.slope > 0.02 and line.correlation > 0.6 and declared.q.max() > 0.4 * top > 0.5:
+    fits = line.slope > 0.02 and line.correlation > 0.6
+    if goes_on and fits and declared.q.max() > 0.4 * top > 0.5:
         yield Equation(
             "reward-scale",
             "",
