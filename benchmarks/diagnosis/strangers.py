@@ -5,7 +5,8 @@
 Trains the programs of `benchmarks.diagnosis.stranger_programs`, or with CartPole-v1 those of
 `benchmarks.diagnosis.cartpole_programs`, in FOLDER: one of each mistake in each round, and two of
 each right one. Each program has a seed of its own, from FIRST_SEED on
-(9000). The limits of the rules were set on the seeds 1000 to 8199. The command may be stopped
+(9000). The limits of the rules were set on the seeds 1000 to 8199, and that of broken networks on
+20000 to 22518 and after a look at some of 9000. The command may be stopped
 and started again: networks and diagnoses in FOLDER are used again. Remove FOLDER/strangers.jsonl
 after a change of the rules. Needs torch. Eight rounds take an hour and a half.
 """

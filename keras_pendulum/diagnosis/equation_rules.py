@@ -36,7 +36,7 @@ def wrong_equation(m: Measurement) -> Finding | None:
 
 
 def shown_discount(m: Measurement) -> float | None:
-    """Returns another γ than the declared one, if the values obey no equation better than its."""
+    """Returns another γ than the declared one, if the values obey its equation best."""
     if not (m.policy.has_q_values and m.finite):
         return None
     found = _obeyed_equation(m)

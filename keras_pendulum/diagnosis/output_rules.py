@@ -118,7 +118,7 @@ def lowest_mean(m: Measurement) -> Finding | None:
     if not m.task.never_terminates or mean > lowest or spread > _SAME_VALUES * -mean:
         return None
     evidence = f"values of {mean:.3g} in all states"
-    return Finding("reward-scale", evidence, f"above {lowest:.0f}, as all of their means")
+    return Finding("reward-scale", evidence, f"above {lowest:.0f}, the lowest possible mean")
 
 
 def batch_broadcast(m: Measurement) -> Finding | None:
