@@ -7,6 +7,7 @@ import gc
 import os
 import re
 import sys
+import sysconfig
 import warnings
 from collections.abc import Iterator
 
@@ -22,13 +23,29 @@ _ENVIRONMENT = {
     "TF_ENABLE_ONEDNN_OPTS": "0",
     "TF_CPP_MIN_LOG_LEVEL": "3",  # no start-up notes
 }
+if sysconfig.get_platform().endswith(("x86_64", "amd64")):
+    # So do XLA, and the kernel of TensorFlow's matrix products, which is oneDNN's even so. Without
+    # fused multiply-add (after AVX), XLA rounds as TensorFlow did in the recorded runs.
+    _ENVIRONMENT["XLA_FLAGS"] = "--xla_cpu_max_isa=AVX"
+    _ENVIRONMENT["ONEDNN_MAX_CPU_ISA"] = "AVX2"
 if sys.platform == "linux":
     # By default SDL shows its pictures with OpenGL, whose driver may load an LLVM that crashes
     # together with TensorFlow's. SDL reads the variable when it makes its first window.
     _ENVIRONMENT["SDL_FRAMEBUFFER_ACCELERATION"] = "0"
+    # NumPy computes the Q-values that choose an action. OpenBLAS does not check whether the
+    # processor has the instructions of this choice.
+    with contextlib.suppress(OSError), open("/proc/cpuinfo", "rb") as processors:
+        if b" avx2 " in processors.read(4096):  # of the first one
+            _ENVIRONMENT["OPENBLAS_CORETYPE"] = "Haswell"
 # A line of the C++ library absl, such as "I0000 00:00:1795466974.767995    4604 port.cc:153] …".
 _NOTE = re.compile(rb"WARNING: All log messages before absl::|[IWE]\d+ [\d:.]+ +\d+ [^ ]+:\d+\] ")
-_ROUNDING = ("TF_NUM_INTRAOP_THREADS", "TF_ENABLE_ONEDNN_OPTS")
+# TensorFlow reads these when it is imported, or at its first product.
+_OF_TENSORFLOW = ("TF_", "XLA_", "ONEDNN_")
+_ROUNDING = [
+    name
+    for name in _ENVIRONMENT
+    if name.startswith(_OF_TENSORFLOW) and name != "TF_CPP_MIN_LOG_LEVEL"
+]
 # Whether the user has imported TensorFlow before this package, and without a choice of both.
 _IMPORTED_BEFORE = "tensorflow" in sys.modules
 _MAY_ROUND_OTHERWISE = _IMPORTED_BEFORE and not os.environ.keys() >= set(_ROUNDING)
@@ -54,22 +71,22 @@ def require_own_tensorflow() -> None:
 
 
 def set_environment_defaults() -> None:
-    """Sets the variables that TensorFlow and SDL read; the user's own values stay.
+    """Sets the variables that TensorFlow, OpenBLAS and SDL read; the user's own values stay.
 
-    A TensorFlow that was imported before this package stays as it is.
+    A TensorFlow or a NumPy that was imported before this package stays as it is.
     """
     for name, value in _ENVIRONMENT.items():
-        if not (_IMPORTED_BEFORE and name.startswith("TF_")):
+        if not (_IMPORTED_BEFORE and name.startswith(_OF_TENSORFLOW)):
             os.environ.setdefault(name, value)
 
 
 def warn_if_not_reproducible() -> None:
     """Warns before a training whose last digits may depend on the computer.
 
-    They do where TensorFlow was imported before this package and chose its threads and oneDNN.
+    They do where TensorFlow was imported before this package and chose its threads and its code.
     """
     if _MAY_ROUND_OTHERWISE:
-        settings = " and ".join(f"{name}={_ENVIRONMENT[name]}" for name in _ROUNDING)
+        settings = " ".join(f"{name}={_ENVIRONMENT[name]}" for name in _ROUNDING)
         warnings.warn(
             "TensorFlow was imported before keras_pendulum: on another computer this run may give "
             f"other numbers; import keras_pendulum first, or set {settings} first "

@@ -12,8 +12,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
+import keras_pendulum as kp  # isort: skip  # before NumPy, which reads its variables
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -21,9 +22,6 @@ from numpy.typing import NDArray
 from keras_pendulum.dqn.replay_buffer import ReplayBuffer, Transitions
 from keras_pendulum.environments.actions import TorqueGrid
 from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
-
-if TYPE_CHECKING:
-    import keras_pendulum as kp
 
 pytest_plugins = ("page_fixtures",)
 TESTS = Path(__file__).parent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import subprocess
 import sys
@@ -14,24 +15,38 @@ from conftest import ROOT
 import keras_pendulum as kp
 from keras_pendulum.tensorflow_setup import _ENVIRONMENT, fast_import
 
-CODE = "import os, keras_pendulum; print(os.environ['TF_NUM_INTRAOP_THREADS'])"
+CODE = """
+import json, os, sys
+import keras_pendulum
+assert "numpy" not in sys.modules  # which would read its variable too early
+print(json.dumps({name: os.environ[name] for name in sys.argv[1:]}))
+"""
 AFTER_TENSORFLOW = """
 import os, sys, types
 sys.modules["tensorflow"] = types.ModuleType("tensorflow")
 import keras_pendulum
 from keras_pendulum.tensorflow_setup import warn_if_not_reproducible
-print(sorted(name for name in os.environ if name.startswith("TF_")))
+print(sorted(name for name in os.environ if name.startswith(("TF_", "XLA_", "ONEDNN_"))))
 for _ in range(2):
     warn_if_not_reproducible()
 """
-OWN = {"TF_NUM_INTRAOP_THREADS": "4", "TF_ENABLE_ONEDNN_OPTS": "1"}
+OWN = {
+    "ONEDNN_MAX_CPU_ISA": "ALL",
+    "TF_ENABLE_ONEDNN_OPTS": "1",
+    "TF_NUM_INTRAOP_THREADS": "4",
+    "XLA_FLAGS": "",
+}
 
 
 def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs code in a process without variables of TensorFlow."""
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("TF_")}
+    """Runs code in a process without variables of TensorFlow and NumPy."""
+    clean = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in _ENVIRONMENT and not name.startswith("TF_")
+    }
     return subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", code, *_ENVIRONMENT],
         env=clean | environment,
         capture_output=True,
         text=True,
@@ -39,15 +54,16 @@ def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_tensorflow_uses_one_thread_unless_the_user_sets_another_number() -> None:
-    assert [run(CODE).stdout, run(CODE, **OWN).stdout] == ["1\n", "4\n"]
+@pytest.mark.parametrize("own", [{}, OWN])
+def test_import_sets_the_variables_that_the_user_has_not_set(own: dict[str, str]) -> None:
+    assert json.loads(run(CODE, **own).stdout) == _ENVIRONMENT | own
 
 
 def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:
     done = run(AFTER_TENSORFLOW)
     assert done.stdout == "[]\n"
     assert done.stderr.count("TensorFlow was imported before keras_pendulum") == 1
-    assert "TF_NUM_INTRAOP_THREADS=1 and TF_ENABLE_ONEDNN_OPTS=0" in done.stderr
+    assert "TF_NUM_INTRAOP_THREADS=1 TF_ENABLE_ONEDNN_OPTS=0" in done.stderr
     # The user's own settings need no warning, and neither does a package that is imported first.
     done = run(AFTER_TENSORFLOW, **OWN)
     assert (done.stdout, done.stderr) == (f"{sorted(OWN)}\n", "")
