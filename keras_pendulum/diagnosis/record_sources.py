@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.recorded_steps import Steps, plain_array, read_steps
+from keras_pendulum.diagnosis.recorded_steps import Steps, read_steps
 from keras_pendulum.diagnosis.recorder import Recorder, VectorRecorder
 from keras_pendulum.diagnosis.signals import nearest
 from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError, UserError
+from keras_pendulum.evaluate.answers import plain_array
 
 Array = NDArray[Any]
 

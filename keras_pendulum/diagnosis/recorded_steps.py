@@ -36,15 +36,6 @@ class Steps(NamedTuple):
     total: Array  # [] int64: steps of the program, also those before the recorded ones
 
 
-def plain_array(value: Any) -> Any:
-    """Returns a value of PyTorch or TensorFlow as an array of NumPy, and another one as it is."""
-    if hasattr(value, "detach"):
-        value = value.detach().cpu()
-        if value.is_floating_point() and value.itemsize < 4:
-            value = value.float()  # NumPy has no bfloat16
-    return value.numpy() if hasattr(value, "numpy") else value
-
-
 def write_steps(steps: Steps, path: str | os.PathLike[str]) -> None:
     """Writes steps to a file. Raises UserError as `Recorder.save` does."""
     if not len(steps.reward):

@@ -117,15 +117,21 @@ def _numbers(answer: Any, batch: Batch, expected: str) -> NDArray[Any]:
 def _array(value: Any, expected: str) -> NDArray[Any]:
     """Returns a value of NumPy, PyTorch, TensorFlow, JAX or Python as an array of real numbers."""
     try:
-        if is_instance(value, "torch", "Tensor"):
-            value = value.detach().cpu()
-            value = value.float() if value.is_floating_point() and value.itemsize < 4 else value
-        array = np.asarray(value)
+        array = np.asarray(plain_array(value))
     except (TypeError, ValueError, RuntimeError, AttributeError) as error:
         raise _wrong(f"a {name_of(type(value))}", expected) from error
     if array.dtype.kind not in "fiu":
         raise _wrong(f"a {name_of(type(value))} of the type {array.dtype}", expected)
     return array
+
+
+def plain_array(value: Any) -> Any:
+    """Returns a value of PyTorch or TensorFlow as an array of NumPy, and another one as it is."""
+    if hasattr(value, "detach"):
+        value = value.detach().cpu()
+        if value.is_floating_point() and value.itemsize < 4:
+            value = value.float()  # NumPy has no bfloat16
+    return value.numpy() if hasattr(value, "numpy") else value
 
 
 def _wrong(found: str, expected: str, row: int = 0) -> ActionError:
