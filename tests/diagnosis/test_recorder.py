@@ -18,7 +18,7 @@ from gymnasium.wrappers import ClipAction, RescaleAction
 from recorded_runs import record_run
 
 import keras_pendulum as kp
-from keras_pendulum.diagnosis import recorder as module
+from keras_pendulum.diagnosis import step_ring
 from keras_pendulum.diagnosis.record_sources import steps_of
 from keras_pendulum.diagnosis.recorded_steps import Steps, read_steps
 from keras_pendulum.diagnosis.recorder import VectorRecorder
@@ -128,7 +128,7 @@ def test_vector_environments_are_recorded_one_after_the_other(mode: AutoresetMod
 
 
 def test_memory_is_bounded_and_the_last_steps_stay(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "LARGEST_RECORD", 60)
+    monkeypatch.setattr(step_ring, "LARGEST_RECORD", 60)
     steps = record_run(episodes=5, steps=20).steps
     whole = 5 * 20
     assert steps.total == whole and 50 < len(steps.reward) < 60
