@@ -90,8 +90,9 @@ def test_100_updates_give_the_same_losses_and_weights(
         batches = take(recorded_transitions, steps[call])  # [10, 32, ...]
         batches = batches._replace(terminated=terminated[call])
         losses, twin_losses = agent.update(batches), twin.update(to_torch(batches))
-        # Measured: at most 2.7e-6 in the losses and 6.8e-6 in the weights, which move by 0.1.
-        np.testing.assert_allclose(twin_losses, losses, rtol=0, atol=1e-5)
+        # Measured: 1.0e-6 in the losses, but 1.0e-5 in one of 2.9 with Huber's loss; and 5.5e-6
+        # in the weights, which move by 0.1.
+        np.testing.assert_allclose(twin_losses, losses, rtol=5e-6, atol=2e-6)
         for network, twin_network in ((agent.online, twin.online), (agent.target, twin.target)):
             twin_weights = torch_agent.to_keras(twin_network)
             assert largest_difference(twin_weights, network.get_weights()) < 2e-5
