@@ -62,7 +62,9 @@ def test_stored_curves_are_as_the_page_says() -> None:
     assert all(
         each["regret"] > 5 * healthy["regret"] for name, each in rows.items() if name != HEALTHY
     )
-    assert rows["small replay buffer"]["loss"] < healthy["loss"] < rows["no target network"]["loss"]
+    assert healthy["loss"] < rows["no target network"]["loss"]
+    # The last updates of this run are large. Its loss is a mean of squares.
+    assert rows["small replay buffer"]["TD error"] < healthy["TD error"]
     assert rows["ε stays at 1"]["mean Q"] > 0 > healthy["mean Q"]
     assert abs(rows["few updates"]["mean Q"]) < 20
 
