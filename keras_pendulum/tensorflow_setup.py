@@ -46,7 +46,7 @@ _ROUNDING = [
     for name in _ENVIRONMENT
     if name.startswith(_OF_TENSORFLOW) and name != "TF_CPP_MIN_LOG_LEVEL"
 ]
-# Whether the user has imported TensorFlow before this package, and without a choice of both.
+# Whether the user has imported TensorFlow before this package, and without a choice of all these.
 _IMPORTED_BEFORE = "tensorflow" in sys.modules
 _MAY_ROUND_OTHERWISE = _IMPORTED_BEFORE and not os.environ.keys() >= set(_ROUNDING)
 _forked_with_tensorflow = False

@@ -14,6 +14,7 @@ updates, as many as here, after every few steps and not after the episode.
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -150,6 +151,8 @@ def main(
     if library is None:
         print("\n".join(versions(["stable-baselines3", "torch", "sbx-rl", "jax"])))
         return
+    for limit in ("XLA_FLAGS", "ONEDNN_MAX_CPU_ISA"):  # JAX and PyTorch read them, too
+        os.environ.pop(limit, None)
     train = {"sb3": train_sb3, "sbx": train_sbx}[library]
     np.savez(out, *train(preset(name, seed=int(seed))))
 
