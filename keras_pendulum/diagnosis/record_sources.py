@@ -57,30 +57,38 @@ def transitions_of(given: Any, task: Task) -> Transitions:
 
     Args:
         given: five arrays (s, a, r, s′, done), or a list of N such tuples; s and s′ may be [N, D],
-            [N, 1, D] or [N, D, 1], the others [N] or [N, 1].
+            [N, D, 1], or [N, E, D] of E environments, the others [N] or [N, E].
         task: whose observations they are. Rows of zeros at the end are left out.
 
     Raises ConfigError, with the name of the field, for other arrays, and TypeError for an object
     that is not a sequence.
     """
     columns = _columns(given, task.observation_size)
-    rows = len(columns[0])
-    if not rows:
+    if not len(columns[0]):
         raise ConfigError(f"transitions is empty; expected {_FIELDS} of a replay buffer")
-    arrays: list[Array] = []
-    for name, column in zip(Transitions._fields, columns, strict=True):
+    named = dict(zip(Transitions._fields, columns, strict=True))
+    arrays = {name: _as_array(name, column) for name, column in named.items()}
+    shape = arrays["observation"].shape
+    rows, several = shape[0], len(shape) == 3 and shape[2] == task.observation_size
+    environments = shape[1] if several else 1
+    for name, array in arrays.items():
         size = task.observation_size if name.endswith("observation") else 1
-        array = _as_array(name, column)
-        if len(array) != rows or array.size != rows * size:
+        if len(array) != rows or array.size != rows * environments * size:
+            of_each = f" for each of {environments} environments" if environments > 1 else ""
             raise ConfigError(
                 f"transitions: {name} has the shape {list(array.shape)}; expected {rows} times "
-                f"{size} numbers, in {_FIELDS}"
+                f"{size} numbers{of_each}, in {_FIELDS}"
             )
-        arrays.append(array.reshape(rows, size) if size > 1 else array.reshape(rows))
+        arrays[name] = array.reshape(rows, environments, size)
     # A buffer that is not full has rows of zeros behind those that were stored.
-    used = np.flatnonzero(arrays[0].any(axis=1) | arrays[3].any(axis=1))
-    stored = slice(0, used[-1] + 1 if len(used) else rows)
-    observation, action, reward, following, terminated = (array[stored] for array in arrays)
+    seen = np.concatenate([arrays["observation"], arrays["next_observation"]], axis=1)
+    used = np.flatnonzero(seen.any(axis=(1, 2)))
+    stored = used[-1] + 1 if len(used) else rows
+    # One environment after the other, so that each step stands behind the one before it.
+    steps = (np.concatenate(array[:stored].swapaxes(0, 1)) for array in arrays.values())
+    observation, action, reward, following, terminated = (
+        array if array.shape[1] > 1 else array[:, 0] for array in steps
+    )
     _require_finite("transitions", observation, action, reward, following, terminated)
     if not np.isin(terminated, (0, 1)).all():
         raise ConfigError("transitions: done has other values than 0 and 1")
@@ -152,10 +160,9 @@ def _columns(given: Any, observed: int) -> Sequence[Any]:
         return [[item[place] for item in items] for place in range(count)]
     if len(items) != count:
         other = next((item for item in items if not _is_row(item, observed)), None)
-        size = f" of {len(other)}" if isinstance(other, Sized) else ""
         raise ConfigError(
-            f"transitions has {len(items)} items that are not all {_FIELDS}, but a "
-            f"{type(other).__name__}{size}; expected five arrays, or a list of such tuples"
+            f"transitions has {len(items)} items that are not all {_FIELDS}, but {_described(other)}"
+            "; expected five arrays, or a list of such tuples"
         )
     return items
 
@@ -170,6 +177,16 @@ def _is_row(item: Any, observed: int) -> bool:
         return [np.size(plain_array(each)) for each in item] == [observed, 1, 1, observed, 1]
     except ValueError:  # lists of several lengths
         return False
+
+
+def _described(item: Any) -> str:
+    size = f" of {len(item)}" if isinstance(item, Sized) else ""
+    if isinstance(item, tuple | list):
+        try:
+            size += f" with the sizes {[np.size(plain_array(each)) for each in item]}"
+        except ValueError:  # lists of several lengths
+            pass
+    return f"a {type(item).__name__}{size}"
 
 
 def _as_array(name: str, column: Any) -> Array:

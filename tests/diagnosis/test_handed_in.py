@@ -73,6 +73,13 @@ LAYOUTS: dict[str, Callable[[Any], Any]] = {
     "arrays": lambda b: b,
     "list of arrays": list,
     "one more axis": lambda b: (b[0][:, None], b[1][:, None], b[2][:, None], b[3][:, None], b[4]),
+    "two environments": lambda b: [
+        np.stack([each[:1500], each[1500:]], axis=1) for each in map(np.asarray, b)
+    ],
+    "two environments, not full": lambda b: [
+        np.concatenate([both, 0 * both[:200]])
+        for both in (np.stack(np.split(np.asarray(each), 2), axis=1) for each in b)
+    ],
     "columns [N, 3, 1]": lambda b: (b[0][..., None], b[1], b[2], b[3][..., None], b[4]),
     "lists": lambda b: [each.tolist() for each in b],
     "rows": lambda b: list(zip(*b, strict=True)),
@@ -126,7 +133,12 @@ def broken(run: Any, place: int, value: Any) -> list[Any]:
         (lambda run: 3, "transitions is a int; expected .s, a, r, s′, done.: five arrays"),
         (lambda run: [], "transitions has 0 items|transitions is empty"),
         (lambda run: buffer_of(run)[:4], "transitions has 4 items .* but a ndarray of 3000"),
-        (lambda run: [(0,) * 6] * 9, "transitions has 9 items .* but a tuple of 6; expected five"),
+        (lambda run: [(0,) * 6] * 9, "9 items .* but a tuple of 6 with the sizes .1, 1, 1, 1, 1, 1."),
+        (lambda run: [([1] * 3, 0, [1] * 3, 0, 0)] * 9, "a tuple of 5 with the sizes .3, 1, 3, 1, 1."),
+        (
+            lambda run: broken(run, 0, np.zeros((3000, 2, 3))),
+            "action has the shape .3000.; expected 3000 times 1 numbers for each of 2 environments",
+        ),
         (lambda run: broken(run, 0, np.zeros((3000, 4))), "observation has the shape .3000, 4."),
         (lambda run: broken(run, 2, np.zeros(7)), "reward has the shape .7."),
         (lambda run: broken(run, 1, ["left"] * 3000), "action is not an array of numbers"),
