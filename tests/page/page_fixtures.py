@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -109,9 +110,9 @@ def chromium() -> Iterator[webdriver.Chrome]:
     driver.quit()
 
 
-@pytest.fixture
-def player(chromium: webdriver.Chrome) -> Iterator[Player]:
-    """A user with a large screen; fails when the browser has logged an error."""
+@contextlib.contextmanager
+def large_screen(chromium: webdriver.Chrome) -> Iterator[Player]:
+    """A user with a large screen; fails at the end when the browser has logged an error."""
     from browser import Player
 
     player = Player(chromium)
@@ -122,6 +123,13 @@ def player(chromium: webdriver.Chrome) -> Iterator[Player]:
     errors = player.log("browser")
     chromium.get("about:blank")  # an open page goes on drawing, which slows other tests
     assert errors == []
+
+
+@pytest.fixture
+def player(chromium: webdriver.Chrome) -> Iterator[Player]:
+    """A user with a large screen; fails when the browser has logged an error."""
+    with large_screen(chromium) as player:
+        yield player
 
 
 @pytest.fixture

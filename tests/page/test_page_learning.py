@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import keras
 import numpy as np
 import pytest
 import tensorflow as tf
 from browser import Player
+from page_fixtures import large_screen
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
@@ -21,6 +23,9 @@ from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.tasks import make_task
 from keras_pendulum.page.learning import OWN_SETTINGS, SWITCHES, learning_config, switched
 from keras_pendulum.train.run import make_optimizer, make_run
+
+if TYPE_CHECKING:
+    from selenium import webdriver
 
 UPDATES = 20
 HEALTHY = learning_config(Pendulum(1.0))
@@ -93,8 +98,16 @@ def draw_batches(run: Any, scale: float) -> Transitions:
     )
 
 
+@pytest.fixture(scope="module")
+def user(pages: dict[str, str], chromium: webdriver.Chrome) -> Iterator[Player]:
+    """One paused page for all tests of this file, which change nothing on it."""
+    with large_screen(chromium) as player:
+        player.open_paused(pages["small"])
+        yield player
+
+
 @pytest.mark.parametrize("case", CASES)
-def test_update_is_that_of_the_package(case: str, pages: dict[str, str], player: Player) -> None:
+def test_update_is_that_of_the_package(case: str, user: Player) -> None:
     config, own = CASES[case]
     own = OWN_SETTINGS | own
     run = make_run(config)
@@ -111,8 +124,7 @@ def test_update_is_that_of_the_package(case: str, pages: dict[str, str], player:
     steps = (Transitions(*(tf.constant(array[k]) for array in batches)) for k in range(UPDATES))
     losses = [float(agent.gradient_step(batch)) for batch in steps]
     agent.average_weights()
-    player.open_paused(pages["small"])
-    found, weights, target = player.run(UPDATE, vars(config) | own, sizes, before, rows)
+    found, weights, target = user.run(UPDATE, vars(config) | own, sizes, before, rows)
     np.testing.assert_allclose(found, losses, rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(weights, flat(agent.online), rtol=0, atol=1e-4)
     np.testing.assert_allclose(target, flat(agent.target), rtol=0, atol=1e-4)
