@@ -18,7 +18,8 @@ from keras_pendulum.version import __version__
 if TYPE_CHECKING:
     from keras_pendulum.config.config import Config
     from keras_pendulum.config.presets import preset
-    from keras_pendulum.diagnosis.diagnosis import Diagnosis, diagnose
+    from keras_pendulum.diagnosis.diagnose import diagnose
+    from keras_pendulum.diagnosis.diagnosis import Diagnosis
     from keras_pendulum.diagnosis.recorder import Recorder
     from keras_pendulum.dqn.network import DQN
     from keras_pendulum.errors import ConfigError, UserError, WeightsError
@@ -70,7 +71,7 @@ _MODULES = {
     "TrainingResult": "train.train_dqn",
     "UserError": "errors",
     "WeightsError": "errors",
-    "diagnose": "diagnosis.diagnosis",
+    "diagnose": "diagnosis.diagnose",
     "evaluate_policy": "evaluate.evaluation",
     "find_weights": "storage.find_weights",
     "load_policy": "evaluate.sources",

@@ -138,7 +138,7 @@ def _train_twin(config: Config) -> list[NDArray[np.float32]]:
 def diagnose_network(network: Network, folder: Path) -> Result:
     """Returns the findings on a network, alone and with its run's record."""
     import keras_pendulum as kp
-    from keras_pendulum.diagnosis.diagnosis import diagnose_measurement
+    from keras_pendulum.diagnosis.diagnose import diagnose_measurement
     from keras_pendulum.diagnosis.run_record import read_record
     from keras_pendulum.storage.run_folder import find_run
 

@@ -39,7 +39,7 @@ COLUMNS = [*FAULTS, *sorted(set(TEXTS) - set(FAULTS)), "no finding"]
 
 def diagnose_case(case: Case, folder: Path) -> Result:
     """Returns the findings on a case's network, and with its run's record where that knows more."""
-    from keras_pendulum.diagnosis.diagnosis import diagnose_measurement
+    from keras_pendulum.diagnosis.diagnose import diagnose_measurement
 
     checkpoint = train_case(case, folder)
     measurement = measurement_of(case, checkpoint)

@@ -30,7 +30,7 @@ def picture_cases() -> dict[str, Case]:
 
 def main(folder: str) -> None:
     """Writes the pictures."""
-    from keras_pendulum.diagnosis.diagnosis import diagnose_measurement
+    from keras_pendulum.diagnosis.diagnose import diagnose_measurement
 
     PICTURES.mkdir(exist_ok=True)
     for name, case in picture_cases().items():

@@ -81,7 +81,7 @@ def _diagnose(arguments: argparse.Namespace) -> int:
         require_no_other_file(Path(arguments.report), b"<!DOCTYPE html>", "an HTML file")
 
     with fast_import():
-        from keras_pendulum.diagnosis.diagnosis import diagnose
+        from keras_pendulum.diagnosis.diagnose import diagnose
         from keras_pendulum.diagnosis.report import as_html
         from keras_pendulum.evaluate.named_policy import named_policy
         from keras_pendulum.storage.run_folder import find_run_if_folder

@@ -16,7 +16,8 @@ from keras_pendulum.diagnosis import signals
 from keras_pendulum.diagnosis.backup import Agreement, Backup, Visited, agreement
 from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.equations import agreements
-from keras_pendulum.diagnosis.motion import Motion, motion_kind
+from keras_pendulum.diagnosis.motion import Motion
+from keras_pendulum.diagnosis.motions import motion_kind
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array, Fit
 from keras_pendulum.diagnosis.states import (
@@ -26,11 +27,9 @@ from keras_pendulum.diagnosis.states import (
     training_states,
     visited_states,
 )
-from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.policy import Observations, Policy
-from keras_pendulum.evaluate.q_policies import DQNPolicy
 from keras_pendulum.optimum.known_dynamics import KnownDynamics, Table
 from keras_pendulum.optimum.solutions import solution
 
@@ -290,23 +289,3 @@ class Measurement:
     def value_spread(self) -> float:
         """The standard deviation of the exact values at `states`."""
         return float(self.exact_q.mean(axis=1).std())
-
-    @cached_property
-    def units(self) -> tuple[float, float]:
-        """The shares of saturated tanh outputs and of dead ReLU units, of the worst layer.
-
-        Both are 0 where the policy is not that of a DQN.
-        """
-        policy = self.policy
-        if not isinstance(policy, DQNPolicy):
-            return 0.0, 0.0
-        weights = policy.weights
-        names = activations_of(policy.activation, len(weights) // 2 - 1)
-        saturated, dead, features = [0.0], [0.0], self.dynamics.observe(self.states)
-        for kernel, bias, name in zip(weights[:-2:2], weights[1:-2:2], names, strict=True):
-            features = ACTIVATIONS[name](features @ kernel + bias)
-            if name == "tanh":
-                saturated.append(float((np.abs(features) > 0.99).mean()))
-            elif name == "relu":
-                dead.append(float((features.max(axis=0) <= 0).mean()))
-        return max(saturated), max(dead)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from keras_pendulum.diagnosis.faults import Fault, Finding
+from keras_pendulum.diagnosis.hidden_units import stuck_units
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.evaluate.q_policies import DQNPolicy
@@ -96,7 +97,7 @@ def _bounded_everywhere(m: Measurement) -> Finding | None:
 def same_everywhere(m: Measurement) -> Finding | None:
     """Finds values that are the same for all states or for all actions."""
     largest = float(np.abs(m.learned_q).max())
-    units = max(m.units)
+    units = max(stuck_units(m))
     spread = float(m.learned_q.std(axis=0).max())
     if spread < 1e-6 * max(1.0, largest):
         evidence = f"values that differ by {spread:.1g} from state to state"
@@ -126,7 +127,7 @@ def batch_broadcast(m: Measurement) -> Finding | None:
     values = m.backup.q
     mean, spread = float(values.mean()), float(values.std())
     reward = mean * (1 - m.discount)  # of a step, if this value is the mean target
-    if not values.std(axis=0).any() or max(m.units) > 0.99:  # a dead network
+    if not values.std(axis=0).any() or max(stuck_units(m)) > 0.99:  # a dead network
         return None
     if m.task.never_terminates:
         own = spread < 0.3 * m.backup.reward.std() and _LOWEST_MEAN_REWARD < reward < -0.3

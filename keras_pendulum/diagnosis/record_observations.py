@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.motion import motion_kind
+from keras_pendulum.diagnosis.motions import motion_kind
 from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum.known_dynamics import KnownDynamics

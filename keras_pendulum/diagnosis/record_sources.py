@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Sequence, Sized
 from typing import Any
@@ -161,8 +162,8 @@ def _columns(given: Any, observed: int) -> Sequence[Any]:
     if len(items) != count:
         other = next((item for item in items if not _is_row(item, observed)), None)
         raise ConfigError(
-            f"transitions has {len(items)} items that are not all {_FIELDS}, but {_described(other)}"
-            "; expected five arrays, or a list of such tuples"
+            f"transitions has {len(items)} items that are not all {_FIELDS}, but "
+            f"{_described(other)}; expected five arrays, or a list of such tuples"
         )
     return items
 
@@ -182,10 +183,8 @@ def _is_row(item: Any, observed: int) -> bool:
 def _described(item: Any) -> str:
     size = f" of {len(item)}" if isinstance(item, Sized) else ""
     if isinstance(item, tuple | list):
-        try:
+        with contextlib.suppress(ValueError):  # lists of several lengths
             size += f" with the sizes {[np.size(plain_array(each)) for each in item]}"
-        except ValueError:  # lists of several lengths
-            pass
     return f"a {type(item).__name__}{size}"
 
 

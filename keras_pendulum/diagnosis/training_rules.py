@@ -9,6 +9,7 @@ import numpy as np
 
 from keras_pendulum.diagnosis import comparisons, repairs
 from keras_pendulum.diagnosis.faults import Finding
+from keras_pendulum.diagnosis.hidden_units import stuck_units
 from keras_pendulum.diagnosis.measurement import Measurement
 
 
@@ -75,7 +76,7 @@ def learning_rate(m: Measurement) -> Finding | None:
     rate, schedule = m.record.config.learning_rate, m.record.config.learning_rate_schedule
     if rate < 5e-3 and (schedule != "constant" or rate < 2e-3):
         return None
-    saturated, dead = m.units
+    saturated, dead = stuck_units(m)
     evidence = f"learning rate {rate:g}, {schedule}; {saturated:.0%} of a layer's tanh "
     evidence += f"units saturated, {dead:.0%} of the ReLU units dead"
     return Finding("learning-rate", evidence, "1e-3, falling to 0")
@@ -83,7 +84,7 @@ def learning_rate(m: Measurement) -> Finding | None:
 
 def saturated_layer(m: Measurement) -> Finding | None:
     """Finds the saturated layer that a large learning rate leaves."""
-    saturated, dead = m.units
+    saturated, dead = stuck_units(m)
     if m.record is None and (saturated > 0.93 or dead > 0.8) and m.value.correlation > 0.8:
         evidence = f"{max(saturated, dead):.0%} of a layer's units saturated or dead"
         return Finding("learning-rate", evidence, "below 85 %")

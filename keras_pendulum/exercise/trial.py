@@ -51,7 +51,7 @@ def run_trial(path: Path, environment: str, steps: int | None = None) -> dict[st
         raise UserError(f"{path}: train() does not return network, buffer, env: {error}") from error
     seconds = time.perf_counter() - began
 
-    from keras_pendulum.diagnosis.diagnosis import diagnose
+    from keras_pendulum.diagnosis.diagnose import diagnose
 
     task = {"gravity": 10.0, "torques": names["ACTIONS"]} if environment == "Pendulum-v1" else {}
     diagnosis = diagnose(

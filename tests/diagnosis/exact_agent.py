@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.diagnosis import Diagnosis, diagnose_measurement
+from keras_pendulum.diagnosis.diagnose import diagnose_measurement
+from keras_pendulum.diagnosis.diagnosis import Diagnosis
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.environments.actions import TorqueGrid

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from exact_agent import NOISE, diagnose_values, exact_values, measure
 
-from keras_pendulum.diagnosis.diagnosis import Diagnosis, diagnose_measurement
+from keras_pendulum.diagnosis.diagnose import diagnose_measurement
+from keras_pendulum.diagnosis.diagnosis import Diagnosis
 from keras_pendulum.diagnosis.faults import FAULTS
 from keras_pendulum.diagnosis.findings import find
 

@@ -133,8 +133,14 @@ def broken(run: Any, place: int, value: Any) -> list[Any]:
         (lambda run: 3, "transitions is a int; expected .s, a, r, s′, done.: five arrays"),
         (lambda run: [], "transitions has 0 items|transitions is empty"),
         (lambda run: buffer_of(run)[:4], "transitions has 4 items .* but a ndarray of 3000"),
-        (lambda run: [(0,) * 6] * 9, "9 items .* but a tuple of 6 with the sizes .1, 1, 1, 1, 1, 1."),
-        (lambda run: [([1] * 3, 0, [1] * 3, 0, 0)] * 9, "a tuple of 5 with the sizes .3, 1, 3, 1, 1."),
+        (
+            lambda run: [(0,) * 6] * 9,
+            "9 items .* but a tuple of 6 with the sizes .1, 1, 1, 1, 1, 1.",
+        ),
+        (
+            lambda run: [([1] * 3, 0, [1] * 3, 0, 0)] * 9,
+            "a tuple of 5 with the sizes .3, 1, 3, 1, 1.",
+        ),
         (
             lambda run: broken(run, 0, np.zeros((3000, 2, 3))),
             "action has the shape .3000.; expected 3000 times 1 numbers for each of 2 environments",

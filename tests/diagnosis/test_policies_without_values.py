@@ -9,7 +9,7 @@ import pytest
 from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
 
 import keras_pendulum as kp
-from keras_pendulum.diagnosis import diagnosis as module
+from keras_pendulum.diagnosis import diagnose as module
 
 
 def right(r: Any, following: Any, own: Any) -> Any:
