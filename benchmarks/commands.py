@@ -85,8 +85,15 @@ COMMANDS = (
     Command(
         "diagnosis.strangers",
         90,
-        (FOLDER,),
-        ("diagnosis_strangers", "diagnosis_cartpole"),
+        (FOLDER, "Pendulum-v1"),
+        ("diagnosis_strangers",),
+        ("torch",),
+    ),
+    Command(
+        "diagnosis.strangers",
+        90,
+        (FOLDER, "CartPole-v1"),
+        ("diagnosis_cartpole",),
         ("torch",),
     ),
     Command("diagnosis.fault_pairs", 60, (FOLDER,), ("diagnosis_pairs",)),

@@ -1,14 +1,13 @@
 """How often a diagnosis is right about networks of programs that share no code with this package.
 
-    python -m benchmarks.diagnosis.strangers FOLDER [FIRST_SEED ROUNDS [ENVIRONMENT]]
+    python -m benchmarks.diagnosis.strangers FOLDER [ENVIRONMENT [FIRST_SEED ROUNDS]]
 
 Trains the programs of `benchmarks.diagnosis.stranger_programs`, or with CartPole-v1 those of
 `benchmarks.diagnosis.cartpole_programs`, in FOLDER: one of each mistake in each round, and two of
-each right one. Each program has a seed of its own, from FIRST_SEED on
-(9000). The limits of the rules were set on the seeds 1000 to 8199, and that of broken networks on
-20000 to 22518 and after a look at some of 9000. The command may be stopped
-and started again: networks and diagnoses in FOLDER are used again. Remove FOLDER/strangers.jsonl
-after a change of the rules. Needs torch. Eight rounds take an hour and a half.
+each right one. Each program has a seed of its own, from FIRST_SEED on. docs/diagnose.md says on
+which seeds the limits of the rules were set. The command may be stopped and started again: networks
+and diagnoses in FOLDER are used again. Remove FOLDER/strangers.jsonl after a change of the rules.
+Needs torch. Eight rounds take an hour and a half.
 """
 
 from __future__ import annotations
@@ -34,6 +33,7 @@ KINDS = {
     "Pendulum-v1": [*stranger_programs.RIGHT, *stranger_programs.MISTAKES],
     "CartPole-v1": [*CARTPOLE_RIGHT, *CARTPOLE_MISTAKES],
 }
+FIRST_SEEDS = {"Pendulum-v1": 23000, "CartPole-v1": 9000}
 HEALTHY = ("no finding", "not-converged")
 
 
@@ -151,18 +151,18 @@ def _row(name: str, results: list[Result]) -> Row:
 
 def main(
     folder: str,
-    first_seed: str = "9000",
-    rounds: str = "8",
     environment: str = "Pendulum-v1",
+    first_seed: str | None = None,
+    rounds: str = "8",
 ) -> None:
     """Trains, diagnoses and writes the results."""
+    first_seed = first_seed or str(FIRST_SEEDS[environment])
     items = (
         (f"{kind} {seed}", partial(diagnose_program, kind, seed, Path(folder)))
         for kind, seed in programs(int(first_seed), int(rounds), environment)
     )
     results = measure_each(items, folder, "strangers")
-    command = f"python -m benchmarks.diagnosis.strangers FOLDER {first_seed} {rounds}"
-    command += "" if environment == "Pendulum-v1" else f" {environment}"
+    command = f"python -m benchmarks.diagnosis.strangers FOLDER {environment} {first_seed} {rounds}"
     name = "strangers" if environment == "Pendulum-v1" else "cartpole"
     write(f"diagnosis_{name}", command, summarize(results))
 

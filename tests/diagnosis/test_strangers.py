@@ -97,15 +97,15 @@ def test_benchmark_uses_its_networks_again(
     )
     written: list[list[dict[str, object]]] = []
     monkeypatch.setattr(strangers, "write", lambda name, command, rows: written.append(rows))
-    strangers.main(str(tmp_path), "1", "1")
+    strangers.main(str(tmp_path), "Pendulum-v1", "1", "1")
     assert len(calls) == 3
     assert [row["program"] for row in written[0]] == [
         *(*kinds, "all mistakes", "all right programs")
     ]
-    strangers.main(str(tmp_path), "1", "1")
+    strangers.main(str(tmp_path), "Pendulum-v1", "1", "1")
     assert len(calls) == 3 and written[0] == written[1]
     (tmp_path / "strangers.jsonl").unlink()
-    strangers.main(str(tmp_path), "1", "1")
+    strangers.main(str(tmp_path), "Pendulum-v1", "1", "1")
     assert len(calls) == 3 and written[0] == written[2]
 
 
