@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.backup import Agreement, Backup
 from keras_pendulum.diagnosis.signals import Array
 
 RIGHT = "r + γ·max Q(s′, ·)"
+NextAction = Callable[[Array, np.random.RandomState], NDArray[np.intp]]
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Equation:
     change: dict[str, Any] | None = None  # arguments of `Visited.backup`
     label: str = ""  # what differs from the declared task
     discount: float | None = None  # γ, where it differs
+    # The next action whose value the target takes: from Q-values [N, A] to indices [N].
+    next_action: NextAction | None = None
 
     def explains(self, own: Agreement, right: Agreement, ends: bool = False) -> bool:
         """Returns whether the network obeys this equation clearly better than the right one.

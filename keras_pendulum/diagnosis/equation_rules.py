@@ -14,24 +14,24 @@ from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
 
-_RIGHT_ERROR = 0.03  # below, no other equation is of interest
+RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _GROWN = 3.0  # spreads above the best possible value
 _UNRELATED = 0.5  # error of the right equation
 _SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
 _DIVERGED = 20.0  # spreads above the best possible value: no equation has this fixed point
-_HEALTHY = f"{RIGHT} to 1 to 7 %"
+HEALTHY = f"{RIGHT} to 1 to 7 %"
 
 
 def wrong_equation(m: Measurement) -> Finding | None:
     """Finds another equation that the values obey clearly better than the right one."""
-    if (found := _obeyed_equation(m)) is None:
+    if (found := obeyed_equation(m)) is None:
         return None
     right, own, equation = m.right_agreement, found.agreement, found.equation
-    evidence = f"the values satisfy {equation.formula} to {_percent(own.error)} and {RIGHT} to "
-    evidence += _percent(right.error)
+    evidence = f"the values satisfy {equation.formula} to {percent(own.error)} and {RIGHT} to "
+    evidence += percent(right.error)
     text = Fault(equation.explanation, equation.remedy) if equation.explanation else None
     return Finding(
-        equation.name, evidence, _HEALTHY, found.repair, equation.variant, text, found.proven
+        equation.name, evidence, HEALTHY, found.repair, equation.variant, text, found.proven
     )
 
 
@@ -39,20 +39,23 @@ def shown_discount(m: Measurement) -> float | None:
     """Returns another γ than the declared one, if the values obey its equation best."""
     if not (m.policy.has_q_values and m.finite):
         return None
-    found = _obeyed_equation(m)
+    found = obeyed_equation(m)
     return None if found is None else found.equation.discount
 
 
-class _Obeyed(NamedTuple):
+class Obeyed(NamedTuple):
+    """A wrong equation, and what shows it."""
+
     agreement: Agreement
     equation: Equation
     repair: Repair | None
     proven: bool
 
 
-def _obeyed_equation(m: Measurement) -> _Obeyed | None:
+def obeyed_equation(m: Measurement) -> Obeyed | None:
+    """Returns the equation that the values obey clearly better than the right one."""
     right = m.right_agreement
-    if m.excess > _DIVERGED or right.error < _RIGHT_ERROR:
+    if m.excess > _DIVERGED or right.error < RIGHT_ERROR:
         return None
     agreements = m.agreements
 
@@ -84,7 +87,7 @@ def _obeyed_equation(m: Measurement) -> _Obeyed | None:
         )
         if repair is not None and repair.won < 0.5 * m.avoidable_regret and not proven:
             continue  # another equation may explain the values as well
-        return _Obeyed(own, equation, repair, proven)
+        return Obeyed(own, equation, repair, proven)
     return None
 
 
@@ -100,11 +103,11 @@ def growth_beyond_ends(m: Measurement) -> Finding | None:
         beyond = equation.name == "missing-end" and own.at_ends > 0.9
         if beyond and own.error < 0.6 * right.error:
             evidence = (
-                f"values of {m.backup.q.mean():.2g}, and {_percent(own.at_ends)} of it in the last "
-                f"step of an episode; they satisfy {equation.formula} to {_percent(own.error)} and "
-                f"{RIGHT} to {_percent(right.error)}"
+                f"values of {m.backup.q.mean():.2g}, and {percent(own.at_ends)} of it in the last "
+                f"step of an episode; they satisfy {equation.formula} to {percent(own.error)} and "
+                f"{RIGHT} to {percent(right.error)}"
             )
-            return Finding("missing-end", evidence, _HEALTHY)
+            return Finding("missing-end", evidence, HEALTHY)
     return None
 
 
@@ -121,15 +124,15 @@ def growth_everywhere(m: Measurement) -> Finding | None:
     if error < _UNRELATED or spread > _SAME * mean or at_ends > 0.85 * mean:
         return None
     evidence = (
-        f"values of {mean:.2g} that differ by {_percent(spread / mean)} from state to state, where "
-        f"the episode goes on; they satisfy {RIGHT} to {_percent(error)}"
+        f"values of {mean:.2g} that differ by {percent(spread / mean)} from state to state, where "
+        f"the episode goes on; they satisfy {RIGHT} to {percent(error)}"
     )
     text = Fault(
         "The target takes one maximum for the whole batch, so the best state of the batch follows "
         "on every state. Its error grows with each copy of the target network.",
         "Give the maximum its axis: max(axis=1) of [B, A] is [B].",
     )
-    return Finding("wrong-target", evidence, _HEALTHY, variant="batch-max", text=text)
+    return Finding("wrong-target", evidence, HEALTHY, variant="batch-max", text=text)
 
 
 def not_converged(m: Measurement) -> Finding | None:
@@ -137,13 +140,14 @@ def not_converged(m: Measurement) -> Finding | None:
     if m.obeys_right_equation:
         return None
     evidence = (
-        f"the values satisfy {RIGHT} to {_percent(m.right_agreement.error)}, and no other equation "
+        f"the values satisfy {RIGHT} to {percent(m.right_agreement.error)}, and no other equation "
     )
     evidence += f"clearly better; correlation of the advantages {m.right_agreement.correlation:.2f}"
-    return Finding("not-converged", evidence, f"{_HEALTHY}; above 0.7")
+    return Finding("not-converged", evidence, f"{HEALTHY}; above 0.7")
 
 
-def _percent(error: float) -> str:
+def percent(error: float) -> str:
+    """Returns an error as a text."""
     return f"{error:.0%}".replace("%", " %") if error < 10 else "more than 1000 %"
 
 

@@ -41,6 +41,7 @@ TARGETS = (
         _next(lambda q: q.mean(axis=2)),
         f"The target takes the mean of the next values, not their maximum. {_TARGET}",
         _TAKE_MAXIMUM,
+        next_action=lambda q, random: random.randint(q.shape[1], size=len(q)),
     ),
     Equation(
         "wrong-target",
@@ -49,6 +50,7 @@ TARGETS = (
         _next(lambda q: q.min(axis=2)),
         f"The target takes the lowest of the next values, not the highest. {_TARGET}",
         f"{_TAKE_MAXIMUM} Of costs take the minimum, but then act by the lowest value, too.",
+        next_action=lambda q, random: q.argmin(axis=1),
     ),
     Equation(
         "wrong-target",
@@ -57,6 +59,7 @@ TARGETS = (
         _next(lambda q: q[:, :, 0]),
         f"The target takes the value of the first action, whatever the next state is. {_TARGET}",
         f"{_TAKE_MAXIMUM} An index [0] in place of max does this.",
+        next_action=lambda q, random: np.zeros(len(q), np.intp),
     ),
     Equation(
         "wrong-target",
@@ -65,6 +68,7 @@ TARGETS = (
         _next(lambda q: q[:, :, -1]),
         f"The target takes the value of the last action, whatever the next state is. {_TARGET}",
         f"{_TAKE_MAXIMUM} An index [-1] in place of max does this.",
+        next_action=lambda q, random: np.full(len(q), q.shape[1] - 1),
     ),
     Equation(
         "wrong-target",

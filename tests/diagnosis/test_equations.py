@@ -116,6 +116,35 @@ def test_right_values_with_an_error_are_not_blamed(size: float, seed: int) -> No
     assert first(diagnosis) in ("not-converged", "no finding")
 
 
+def rough(target: Callable[..., Any], size: float, waves: int) -> Callable[[Any], Any]:
+    """Returns the values of a target with an error that differs from state to state."""
+    values, directions = fixed_point(target), np.random.RandomState(0).normal(size=(3, 5))
+    return lambda o: values(o) + size * np.sin(waves * o @ directions)
+
+
+@pytest.mark.parametrize("waves", [4, 8])
+@pytest.mark.parametrize(
+    ("finding", "target"),
+    [
+        ("wrong-target (mean-next)", TARGETS["wrong-target (mean-next)"]),
+        ("wrong-target (min-next)", TARGETS["wrong-target (min-next)"]),
+        ("wrong-target (fixed-action-next)", lambda r, next_q, own: r + 0.9 * next_q[:, :, LAST]),
+    ],
+)
+def test_ten_steps_show_the_target_where_one_step_does_not(
+    finding: str, target: Callable[..., Any], waves: int
+) -> None:
+    diagnosis = diagnose(rough(target, 3, waves))
+    assert first(diagnosis) == finding
+    assert "over 10 steps, the values satisfy r + γ·" in diagnosis.verdict
+
+
+@pytest.mark.parametrize("waves", [2, 4, 8])
+@pytest.mark.parametrize("size", [1, 4])
+def test_right_values_with_a_rough_error_follow_no_other_policy(size: float, waves: int) -> None:
+    assert first(diagnose(rough(right, size, waves))) in ("not-converged", "no finding")
+
+
 @pytest.mark.parametrize(
     ("changes", "explains"),
     [

@@ -1,0 +1,75 @@
+"""The rule that follows the policy whose value a wrong target learns.
+
+A target that takes the mean of the next values learns the value of random actions; one that takes
+the lowest, that of the worst ones. Over one step, the sides of such an equation differ little from
+those of the right one. Over ten steps, the difference grows, and the network's own errors do not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from keras_pendulum.diagnosis.equation import RIGHT, NextAction
+from keras_pendulum.diagnosis.equation_rules import HEALTHY, RIGHT_ERROR, obeyed_equation, percent
+from keras_pendulum.diagnosis.faults import Fault, Finding
+from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.target_equations import TARGETS
+
+_STEPS = 10
+_ROWS = 300  # states with an action each
+_REPEATS = 4  # of each row, because a policy may be random
+_LARGEST_ERROR = 0.8
+_SHARE = 0.6  # of the error of the right equation
+_SHARE_OF_SECOND = 0.9  # of the error of the next best equation
+_LOWER = -0.25  # spreads: how much lower the values are than those of the greedy policy
+
+
+class _LongAgreement(NamedTuple):
+    error: float  # root mean square of Q minus target, as a share of the spread of Q
+    mean: float  # of Q minus target, as a share of the spread
+
+
+def followed_policy(m: Measurement) -> Finding | None:
+    """Finds values that are those of another policy than the greedy one."""
+    if not (m.task.never_terminates and m.finite) or m.right_agreement.error < RIGHT_ERROR:
+        return None
+    found = obeyed_equation(m)
+    if found is not None and found.equation.next_action is None:
+        return None
+    right = _over_steps(m, lambda q, random: q.argmax(axis=1))
+    if right.mean > _LOWER:
+        return None
+    candidates = [
+        (_over_steps(m, each.next_action), each) for each in TARGETS if each.next_action is not None
+    ]
+    (own, equation), (second, _) = sorted(candidates, key=lambda item: item[0].error)[:2]
+    if own.error > min(_LARGEST_ERROR, _SHARE * right.error, _SHARE_OF_SECOND * second.error):
+        return None
+    evidence = (
+        f"over {_STEPS} steps, the values satisfy {equation.formula} to {percent(own.error)} and "
+        f"{RIGHT} to {percent(right.error)}"
+    )
+    text = Fault(equation.explanation, equation.remedy)
+    return Finding(equation.name, evidence, HEALTHY, variant=equation.variant, text=text)
+
+
+def _over_steps(m: Measurement, next_action: NextAction) -> _LongAgreement:
+    """Returns how well the values agree with ten rewards and the value after them."""
+    random = np.random.RandomState(4)
+    states = m.visited.states
+    states = np.repeat(states[random.randint(len(states), size=_ROWS)], _REPEATS, axis=0)
+    action = np.repeat(random.randint(len(m.efforts), size=_ROWS), _REPEATS)
+    q = m.q_values(m.dynamics.observe(states))[np.arange(len(states)), action]
+    target, factor = np.zeros(len(states)), 1.0
+    for _ in range(_STEPS):
+        outcomes = m.dynamics.outcomes(states, m.efforts[action][:, None])
+        target += factor * outcomes.reward[:, 0]
+        factor *= m.discount
+        states = outcomes.state[:, 0]
+        values = m.q_values(m.dynamics.observe(states))
+        action = next_action(values, random)
+    target += factor * values[np.arange(len(states)), action]
+    error = (q - target).reshape(_ROWS, _REPEATS).mean(axis=1) / m.backup.spread
+    return _LongAgreement(float(np.sqrt(np.mean(error**2))), float(error.mean()))
