@@ -34,6 +34,11 @@ KINDS = {
     "CartPole-v1": [*CARTPOLE_RIGHT, *CARTPOLE_MISTAKES],
 }
 FIRST_SEEDS = {"Pendulum-v1": 23000, "CartPole-v1": 9000}
+# A rule was set after a look at these programs with lower seeds.
+LOOKED_AT = {
+    *stranger_programs.RIGHT,
+    *(f"{which} of the next values" for which in ("mean", "minimum", "first", "last")),
+}
 HEALTHY = ("no finding", "not-converged")
 
 
@@ -43,7 +48,7 @@ def programs(
     """Yields kind and seed of each program."""
     for round_ in range(rounds):
         for number, kind in enumerate(KINDS[environment]):
-            seed = first_seed + 100 * number + 2 * round_
+            seed = first_seed + 100 * number + 2 * round_ + (2000 if kind in LOOKED_AT else 0)
             yield kind, seed
             if kind in RIGHT:
                 yield kind, seed + 1
