@@ -48,7 +48,7 @@ def programs(
     """Yields kind and seed of each program."""
     for round_ in range(rounds):
         for number, kind in enumerate(KINDS[environment]):
-            seed = first_seed + 100 * number + 2 * round_ + (2000 if kind in LOOKED_AT else 0)
+            seed = first_seed + 100 * number + 2 * round_ + (4000 if kind in LOOKED_AT else 0)
             yield kind, seed
             if kind in RIGHT:
                 yield kind, seed + 1

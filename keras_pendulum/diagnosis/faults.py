@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -188,6 +189,7 @@ class Finding:
     variant: str = ""  #: which target, loss or head, such as `mean-next`
     text: Fault | None = None  #: of the variant
     proven: bool = False  #: whether stored actions show it, without a repair
+    long_errors: Mapping[str, float] | None = None  #: over ten steps, where they are the evidence
 
     @property
     def title(self) -> str:

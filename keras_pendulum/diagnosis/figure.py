@@ -59,7 +59,7 @@ def draw_diagnosis(
         if repairs:
             _draw_repairs(last, measurement, repairs)
         else:
-            _draw_equations(last, measurement)
+            _draw_equations(last, measurement, [*findings, *notes])
         if findings:
             panels = {values: _VALUES, outputs: _OUTPUTS, torques: _TORQUES}
             guilty = (axes for axes, shown in panels.items() if findings[0].name in shown)
@@ -121,9 +121,11 @@ def _draw_differences(axes: Axes, measurement: Measurement) -> None:
     axes.legend(frameon=False)
 
 
-def _draw_equations(axes: Axes, measurement: Measurement) -> None:
+def _draw_equations(axes: Axes, measurement: Measurement, findings: Sequence[Finding]) -> None:
     """Draws the errors of the right equation and of those that fit best."""
-    nearest = dict(islice(measurement.equation_errors.items(), 1 + _SHOWN_EQUATIONS))
+    over_steps = next((each.long_errors for each in findings[:1] if each.long_errors), None)
+    all_errors = over_steps or measurement.equation_errors
+    nearest = dict(islice(all_errors.items(), 1 + _SHOWN_EQUATIONS))
     errors = {name.replace(f"{RIGHT} with", "…"): error for name, error in nearest.items()}
     shown = [min(100 * error, _LARGEST_ERROR) for error in errors.values()]
     names = [plain_text(name, letters=26) for name in errors]
@@ -131,7 +133,8 @@ def _draw_equations(axes: Axes, measurement: Measurement) -> None:
     axes.bar_label(bars, [f" {_percent(error)}" for error in errors.values()])
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set(xlim=(0, 1.2 * _LARGEST_ERROR), xlabel="Error (share of the spread of the values, %)")
-    axes.set_title("How well the values satisfy an equation")
+    steps = ", over ten steps" if over_steps else ""
+    axes.set_title(f"How well the values satisfy an equation{steps}")
 
 
 def _percent(error: float) -> str:
