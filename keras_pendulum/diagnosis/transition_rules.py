@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from keras_pendulum.diagnosis import repairs
 from keras_pendulum.diagnosis.faults import FAULTS, Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.motion import FEW
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.stored_rewards import StoredRewards
 
-_FEW = 200  # transitions that show nothing for sure
 _BATCH = 512  # a larger set of transitions is not a batch
 _SMALL_BUFFER = 6000
 _OTHER_EFFORT = 0.05  # N·m or N
@@ -24,7 +24,7 @@ _OTHER_EFFORT = 0.05  # N·m or N
 def stored_transitions(m: Measurement) -> Finding | None:
     """Checks the stored transitions against the dynamics: a mismatch is a proof."""
     r = m.record
-    if r is None or len(r.replay.action) < _FEW:
+    if r is None or len(r.replay.action) < FEW:
         return None
     rewards = StoredRewards.of(r, m.dynamics, m.efforts, m.reward_scale)
     if rewards.fit.correlation < -0.9:
