@@ -14,7 +14,8 @@ from keras_pendulum.config.fields import Number
 from keras_pendulum.diagnosis.diagnosis import Diagnosis
 from keras_pendulum.diagnosis.equation_rules import shown_discount
 from keras_pendulum.diagnosis.findings import find, find_in_record
-from keras_pendulum.diagnosis.measurement import STARTS, Measurement
+from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.played_agent import STARTS
 from keras_pendulum.diagnosis.repairs import find_by_repairs
 from keras_pendulum.diagnosis.run_record import make_record, read_record
 from keras_pendulum.dqn.network import DQN

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from keras_pendulum.diagnosis.faults import Finding, Repair
-from keras_pendulum.diagnosis.measurement import STARTS, Measurement
+from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.played_agent import STARTS
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.states import Act, observation_changes
 

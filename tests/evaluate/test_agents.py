@@ -309,6 +309,11 @@ def test_torques_in_all_libraries_and_types_are_accepted() -> None:
     np.testing.assert_array_equal(answering(half).act(OBSERVATIONS), np.ones((9, 1)))
 
 
+def test_torque_beyond_the_limit_by_a_rounding_is_the_limit() -> None:
+    for answer, torque in ((2.000004, 2.0), (-2.000004, -2.0)):
+        np.testing.assert_array_equal(answering(answer).act(OBSERVATIONS), np.full((9, 1), torque))
+
+
 def test_integers_of_a_function_are_indices_of_its_torques() -> None:
     for index in (2, np.int64(2), np.array([2])):
         agent = as_policy(lambda observation, index=index: index, torques=[-2, 0, 1.5])

@@ -103,3 +103,11 @@ def test_array_without_stored_numbers_is_refused(tmp_path: Path) -> None:
         file.create_dataset("a", (2, 2), "f4")
         with pytest.raises(kp.WeightsError, match=r"a .* is not a plain array"):
             contents(file, 100)
+
+
+def test_array_in_chunks_is_refused(tmp_path: Path) -> None:
+    """Its numbers may be behind a filter, though they are as many as they should be."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("a", data=np.ones((2, 2), "f4"), chunks=(2, 2))
+        with pytest.raises(kp.WeightsError, match=r"a .* is not a plain array"):
+            contents(file, 100)
