@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib
 import json
 import os
@@ -178,9 +179,15 @@ def refusal(
 
 
 @contextlib.contextmanager
-def drawing_nothing() -> Iterator[None]:
-    """Draws nothing after a run, which takes a second: its picture is a few bytes."""
+def ending_shortly() -> Iterator[None]:
+    """Ends a run with the score of two starts and with a picture of a few bytes.
+
+    Those of a user take longer than a short training.
+    """
+    train_dqn = importlib.import_module("keras_pendulum.train.train_dqn")
+    score_of = functools.partial(train_dqn.evaluate_policy, episodes=2)
     with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(train_dqn, "evaluate_policy", score_of)
         # The optimum of another number of steps takes many seconds.
         patched.setattr(
             "keras_pendulum.train.reference_returns.reference_returns", lambda config: {}
@@ -191,9 +198,9 @@ def drawing_nothing() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def no_picture() -> Iterator[None]:
-    """Draws nothing in all tests of a file, from the first that names it."""
-    with drawing_nothing():
+def short_ending() -> Iterator[None]:
+    """Ends the runs shortly in all tests of a file, from the first that names it."""
+    with ending_shortly():
         yield
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import DATA
 from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
 
 import keras_pendulum as kp
@@ -106,6 +107,42 @@ def test_constant_that_is_added_to_the_rewards_is_named(size: float, constant: f
 @pytest.mark.parametrize("sweeps", [2, 5, 10, 20, 40])
 def test_right_program_that_has_not_converged_is_not_blamed(sweeps: int) -> None:
     assert first(diagnose(fixed_point(right, sweeps))) in ("not-converged", "no finding")
+
+
+@pytest.mark.parametrize(
+    ("name", "torques", "discount"), [("three", 3, 0.9), ("five", 5, 0.95), ("eleven", 11, 0.9)]
+)
+def test_short_training_is_not_taken_for_another_gravity(
+    name: str, torques: int, discount: float
+) -> None:
+    """Its values are too smooth: they satisfy the equation with g = 1 to 5 better than their own.
+
+    The networks were trained by a PyTorch program without a fault, with about 2000 updates.
+    """
+    with np.load(DATA / "short_trainings.npz") as arrays:
+        weights = [arrays[f"{name}_{place}"] for place in range(6)]
+
+    def q_values(observations: Any) -> Any:
+        for weight, bias in zip(weights[:-2:2], weights[1:-2:2], strict=True):
+            observations = np.maximum(observations @ weight + bias, 0)
+        return observations @ weights[-2] + weights[-1]
+
+    function = kp.q_function(q_values, np.linspace(-2, 2, torques), "a student's")
+    diagnosis = kp.diagnose(function, gravity=10.0, discount=discount)
+    assert first(diagnosis) in ("not-converged", "no finding")
+    equation, right = diagnosis.measurement.agreements[0], diagnosis.measurement.right_agreement
+    assert equation[1].name == "other-gravity" and equation[0].error < 0.75 * right.error
+
+
+@pytest.mark.parametrize("sweeps", [5, 10, 20])
+def test_wrong_sign_of_the_rewards_is_named_before_the_values_have_converged(sweeps: int) -> None:
+    assert first(diagnose(fixed_point(TARGETS["reward-sign"], sweeps))) == "reward-sign"
+
+
+def test_values_that_grow_without_bound_are_not_those_of_large_rewards() -> None:
+    values = fixed_point(right)
+    assert first(diagnose(lambda o: 100 * values(o))) == "reward-scale"
+    assert first(diagnose(lambda o: 1e5 * np.sin(40 * o @ UNTRAINED) - 1e6)) == "broken-network"
 
 
 @pytest.mark.parametrize("size", [0.5, 1.0, 2.0, 4.0])

@@ -115,7 +115,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def type_command(
-    folder: Path, in_process: Command, monkeypatch: pytest.MonkeyPatch, no_picture: None
+    folder: Path, in_process: Command, monkeypatch: pytest.MonkeyPatch, short_ending: None
 ) -> Callable[[str], str]:
     """Runs a command in the folder of the pages, and returns what it prints."""
     monkeypatch.chdir(folder)

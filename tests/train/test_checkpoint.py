@@ -31,7 +31,7 @@ from keras_pendulum.train.checkpoint import (
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import make_run
 
-pytestmark = pytest.mark.usefixtures("no_picture")
+pytestmark = pytest.mark.usefixtures("short_ending")
 
 
 @pytest.mark.parametrize("name", ["original", "reference", "cartpole-original", "cartpole"])
@@ -102,7 +102,7 @@ def test_extended_run_continues_from_the_averaged_weights_at_the_rate_of_the_lon
 
 @pytest.fixture(scope="module")
 def short_run(
-    no_picture: None, tmp_path_factory: pytest.TempPathFactory
+    short_ending: None, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Config, kp.TrainingResult, Path]:
     """A run of two episodes, and its folder."""
     config = kp.preset("original", episodes=2, **SHORT)

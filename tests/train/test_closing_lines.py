@@ -145,7 +145,7 @@ def test_evaluations_are_summed_up(tmp_path: Path) -> None:
 
 
 def test_finished_run_that_is_resumed_says_how_to_extend_it(
-    in_process: Command, no_picture: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    in_process: Command, short_ending: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(evaluations, "SEEDS", range(900, 902))
     words = ["--preset", "original", "--hidden-units", "8", "--episodes", "3", "--out", "my run"]

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.usefixtures("few_starts")
 
 
 @pytest.fixture(scope="module")
-def few_starts(no_picture: None) -> Iterator[None]:
+def few_starts(short_ending: None) -> Iterator[None]:
     """Evaluates on few starts and draws nothing."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(evaluations, "SEEDS", FEW_STARTS)

@@ -57,7 +57,7 @@ def train_with_two_kills(name: str, folder: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def resumed_runs(no_picture: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def resumed_runs(short_ending: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder with the folders of the runs."""
     folder = tmp_path_factory.mktemp("runs")
     with ThreadPoolExecutor(2) as pool:  # each thread waits for processes

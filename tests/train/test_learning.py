@@ -17,9 +17,10 @@ from keras_pendulum.history import csv_header
 def test_run_learns_far_more_than_random_actions_and_leaves_four_files(tmp_path: Path) -> None:
     config, folder = kp.preset("reference", episodes=100), tmp_path / "new" / "folder"
     result = kp.train_dqn(config, folder)
-    score = kp.evaluate_policy(result.network, episodes=30)
+    score = kp.evaluate_policy(result.network)
+    assert result.score is not None and result.score.regret == score.regret
     assert score.mean_return > -250  # uniformly random torque: -909
-    saved = kp.evaluate_policy(kp.load_weights(folder / "pendulum_weight.h5"), episodes=30)
+    saved = kp.evaluate_policy(kp.load_weights(folder / "pendulum_weight.h5"))
     np.testing.assert_array_equal(saved.returns, score.returns)
 
     names = {"pendulum_weight.h5", "history.csv", "config.json", "rewards.png"}

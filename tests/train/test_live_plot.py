@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import Command, drawing_nothing
+from conftest import Command, ending_shortly
 from figure_texts import figure_of, require_legible
 
 import keras_pendulum as kp
@@ -125,7 +125,7 @@ def test_live_plot_without_a_display_is_refused(monkeypatch: pytest.MonkeyPatch)
 def test_train_live_without_a_display_prints_one_line_and_trains(in_process: Command) -> None:
     no_display = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
     words = ["--live", "--preset", "original", "--episodes", "2", "--hidden-units", "8"]
-    with drawing_nothing():
+    with ending_shortly():
         done = in_process("train", *words, environment=no_display)
     assert done.returncode == 0
     assert done.stderr.startswith("no live plot: there is no display")
@@ -135,7 +135,7 @@ def test_train_live_without_a_display_prints_one_line_and_trains(in_process: Com
 
 def test_train_render_shows_the_environment(in_process: Command) -> None:
     words = ["--render", "--preset", "cartpole-original", "--episodes", "2"]
-    with drawing_nothing():
+    with ending_shortly():
         done = in_process("train", *words, environment={"SDL_VIDEODRIVER": "dummy"})
     assert (done.returncode, done.stderr) == (0, "")
     assert "Trained 2 episodes" in done.stdout

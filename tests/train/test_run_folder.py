@@ -24,7 +24,7 @@ from keras_pendulum.train.checkpoint import (
     save_checkpoint,
 )
 
-pytestmark = pytest.mark.usefixtures("no_picture")
+pytestmark = pytest.mark.usefixtures("short_ending")
 CONFIG = kp.preset("original", episodes=2, **SHORT)
 
 

@@ -21,7 +21,7 @@ from keras_pendulum.train.checkpoint import load_checkpoint
 if sys.platform == "win32":
     pytest.skip("needs links, pipes and moved folders", allow_module_level=True)
 
-pytestmark = pytest.mark.usefixtures("no_picture")
+pytestmark = pytest.mark.usefixtures("short_ending")
 
 
 @pytest.mark.parametrize("name", ["pendulum_weight.h5", "cartpole_weight.h5", "history.csv"])

@@ -24,12 +24,12 @@ FILE = "pendulum_weight_snapshots.h5"
 CONFIG = kp.preset("reference", episodes=12, snapshots=5, save_every=5, **SHORT)
 
 
-pytestmark = pytest.mark.usefixtures("no_picture")
+pytestmark = pytest.mark.usefixtures("short_ending")
 
 
 @pytest.fixture(scope="module")
 def whole_run(
-    no_picture: None, tmp_path_factory: pytest.TempPathFactory
+    short_ending: None, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[kp.TrainingResult, Path, dict[int, Any]]:
     """A run that is not interrupted, its folder, and its weights after each episode."""
     folder = tmp_path_factory.mktemp("whole")

@@ -56,7 +56,7 @@ def test_listeners_get_the_record_of_each_episode() -> None:
 
 @pytest.mark.parametrize(("episodes", "saved"), [(21, [0, 10, 20]), (13, [0, 10, 12])])
 def test_on_checkpoint_is_called_once_for_each_checkpoint(
-    episodes: int, saved: list[int], no_picture: None, tmp_path: Path
+    episodes: int, saved: list[int], short_ending: None, tmp_path: Path
 ) -> None:
     calls: list[tuple[kp.DQN, int]] = []
     config = replace(CONFIG, episodes=episodes)
@@ -67,7 +67,7 @@ def test_on_checkpoint_is_called_once_for_each_checkpoint(
 
 @pytest.mark.parametrize(("stop_after", "finished"), [(1, False), (3, True)])
 def test_should_stop_ends_the_run_after_an_episode(
-    stop_after: int, finished: bool, no_picture: None, tmp_path: Path
+    stop_after: int, finished: bool, short_ending: None, tmp_path: Path
 ) -> None:
     records: list[EpisodeRecord] = []
     result = kp.train_dqn(
@@ -80,14 +80,14 @@ def test_should_stop_ends_the_run_after_an_episode(
     assert (tmp_path / "rewards.png").exists() == finished
     if finished:
         assert result.score is not None
-        assert result.score.regret == kp.evaluate_policy(result.network).regret
+        assert result.score.regret == kp.evaluate_policy(result.network, 2).regret
     else:
         assert result.score is None
     assert len(load_checkpoint(tmp_path / "pendulum_weight.h5", CONFIG).history) == stop_after
 
 
 def test_environment_is_closed_however_the_run_ends(
-    no_picture: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    short_ending: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     closed: list[Any] = []
     monkeypatch.setattr(TimeLimit, "close", lambda env: closed.append(env))
