@@ -161,8 +161,9 @@ FAULTS: dict[str, Fault] = {
     "not-converged": Fault(
         "The values do not satisfy the right equation yet, and no wrong one clearly better. So the "
         "training was too short, or something disturbed it that the network alone does not show.",
-        "Train for longer, and look at the loss: it should fall until the end. A record of the run "
-        "shows what else it can be.",
+        "Train for longer, and look at the loss: it should fall until the end. If it does and the "
+        "advantages still do not agree, check that the loss takes the output of the stored action. "
+        "A record of the run shows what else it can be.",
     ),
 }
 
