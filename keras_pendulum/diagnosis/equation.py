@@ -32,7 +32,7 @@ class Equation:
     largest_error: float = 0.25
     share: float = 0.88  # of the right equation's error that it may have at most
     flat: float = 0.0  # above 0: the advantages of Q are at most this share of the right ones
-    better_advantages: bool = False  # whether these must agree better than with the right one
+    like_short_training: bool = False  # whether right values that have not converged look like it
     offset: bool = False  # whether it has no next values, and Q - r is as it says
     change: dict[str, Any] | None = None  # arguments of `Visited.backup`
     label: str = ""  # what differs from the declared task
@@ -53,8 +53,10 @@ class Equation:
             return True
         if self.change is not None and own.mean > 0:
             return False  # no reward of the pendulum is positive, whatever its gravity
-        if self.better_advantages and own.correlation < right.correlation:
-            return False
+        if self.like_short_training and own.error > _SATISFIED:
+            is_clear = own.error < 0.45 * right.error and own.correlation > right.correlation
+            if not is_clear:
+                return False
         if self.change is None and not 0.8 < own.position < 1.35:
             return False
         if self.flat == np.inf:
@@ -77,6 +79,8 @@ class Equation:
             return right.correlation < 0.5
         return True
 
+
+_SATISFIED = 0.04  # an error that leaves no doubt
 
 # The largest error, its share of the right equation's error, and the least correlation.
 _LIMITS_WITH_ENDS = {

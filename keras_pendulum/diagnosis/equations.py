@@ -101,7 +101,7 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             equation = _changed("other-gravity", f"g = {gravity:g}", task=task)
             # After a short training, values are as smooth as at a low gravity. But then the
             # advantages agree no better.
-            low = replace(equation, share=0.5, better_advantages=True)
+            low = replace(equation, share=0.55, like_short_training=True)
             yield low if gravity < own else equation
     # The sign of the correlation is the main evidence.
     yield _changed(
