@@ -179,13 +179,13 @@ def refusal(
 
 
 @contextlib.contextmanager
-def ending_shortly() -> Iterator[None]:
-    """Ends a run with the score of two starts and with a picture of a few bytes.
+def ending_shortly(starts: int = 2) -> Iterator[None]:
+    """Ends a run with the score of a few starts and with a picture of a few bytes.
 
     Those of a user take longer than a short training.
     """
     train_dqn = importlib.import_module("keras_pendulum.train.train_dqn")
-    score_of = functools.partial(train_dqn.evaluate_policy, episodes=2)
+    score_of = functools.partial(train_dqn.evaluate_policy, episodes=starts)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(train_dqn, "evaluate_policy", score_of)
         # The optimum of another number of steps takes many seconds.

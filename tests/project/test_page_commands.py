@@ -15,7 +15,7 @@ from typing import Any
 import gymnasium
 import keras
 import pytest
-from conftest import ROOT, Command
+from conftest import ROOT, Command, ending_shortly
 
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
@@ -113,9 +113,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def no_picture() -> Iterator[None]:
+    """Draws nothing after a run. Its score is the whole one, which the pages show."""
+    with ending_shortly(starts=100):
+        yield
+
+
 @pytest.fixture
 def type_command(
-    folder: Path, in_process: Command, monkeypatch: pytest.MonkeyPatch, short_ending: None
+    folder: Path, in_process: Command, monkeypatch: pytest.MonkeyPatch, no_picture: None
 ) -> Callable[[str], str]:
     """Runs a command in the folder of the pages, and returns what it prints."""
     monkeypatch.chdir(folder)
