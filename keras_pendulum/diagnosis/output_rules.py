@@ -17,7 +17,7 @@ _WORST_REWARD = -Pendulum.reward_range[0]
 # A pendulum that hangs at rest costs π² a step, and no policy more on average.
 _LOWEST_MEAN_REWARD = -1.3 * np.pi**2
 _SAME_VALUES = 0.01  # spread of values that are the same in all states, as a share of their mean
-_DIVERGED = 1000  # times the lowest possible value
+_BEYOND_REWARDS = 1000  # times the lowest possible value
 _AT_THE_BOUND = 0.3  # share of the outputs; a linear head has none there
 
 
@@ -160,8 +160,8 @@ def reward_size(m: Measurement) -> Finding | None:
     lowest = -_WORST_REWARD / max(1 - m.discount, 0.005)
     mean = float(m.learned_q.mean())
     if mean < lowest:
-        # Nobody has rewards that are so large; values that grow without bound are.
-        name = "broken-network" if mean < _DIVERGED * lowest else "reward-scale"
+        # No rewards are so large, but values that grow without bound are.
+        name = "broken-network" if mean < _BEYOND_REWARDS * lowest else "reward-scale"
         return Finding(
             name, f"a mean value of {mean:.3g}", f"above {lowest:.0f}, the lowest possible"
         )

@@ -117,7 +117,7 @@ def test_short_training_is_not_taken_for_another_gravity(
 ) -> None:
     """Its values are too smooth: they satisfy the equation with g = 1 to 5 better than their own.
 
-    The networks were trained by a PyTorch program without a fault, with about 2000 updates.
+    A PyTorch program without a fault made the networks, with 1900 to 2800 updates.
     """
     with np.load(DATA / "short_trainings.npz") as arrays:
         weights = [arrays[f"{name}_{place}"] for place in range(6)]
