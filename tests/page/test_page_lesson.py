@@ -162,14 +162,12 @@ def test_healthy_and_faulty_run_start_alike_and_stay_side_by_side(
     wait_for(lambda: len(records(player)[0]) >= 60)
     player.find("train").click()
     wait_for(lambda: player.text("learning-status") == "Paused.")
-    wait_for(lambda: len({len(each) for each in records(player)}) == 1)
+    reading = "return document.querySelector('[data-reading=\"episode-1\"]').textContent"
+    # The episodes that have begun end after the click, and only then the page is drawn.
+    wait_for(lambda: {f"{len(each)}/500" for each in records(player)} == {player.run(reading)})
     one, other = records(player)
     assert one[40]["episodeReturn"] == other[40]["episodeReturn"]  # before the first update
     assert one[45]["episodeReturn"] != other[45]["episodeReturn"]
-    readings = player.run(
-        "return document.querySelector('[data-reading=\"episode-1\"]').textContent"
-    )
-    assert readings == f"{len(other)}/500"
 
 
 def test_switch_starts_both_runs_anew_while_they_learn(
