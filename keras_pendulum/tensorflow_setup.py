@@ -17,8 +17,11 @@ from keras_pendulum.status import status
 _ENVIRONMENT = {
     "KERAS_BACKEND": "tensorflow",
     # The number of threads of a matrix product changes its rounding, and one changed digit makes
-    # another run. With a fixed number, a run does not depend on the number of cores.
+    # another run. With a fixed number, a run does not depend on the number of cores. NumPy, which
+    # computes the Q-values that choose an action, has OpenBLAS. Several threads of it would also
+    # wait for each other with all their power where other processes need the cores.
     "TF_NUM_INTRAOP_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
     # oneDNN chooses its kernels by the processor, and each rounds differently.
     "TF_ENABLE_ONEDNN_OPTS": "0",
     "TF_CPP_MIN_LOG_LEVEL": "3",  # no start-up notes
@@ -32,8 +35,7 @@ if sys.platform == "linux":
     # By default SDL shows its pictures with OpenGL, whose driver may load an LLVM that crashes
     # together with TensorFlow's. SDL reads the variable when it makes its first window.
     _ENVIRONMENT["SDL_FRAMEBUFFER_ACCELERATION"] = "0"
-    # NumPy computes the Q-values that choose an action. OpenBLAS does not check whether the
-    # processor has the instructions of this choice.
+    # OpenBLAS does not check whether the processor has the instructions of this choice.
     with contextlib.suppress(OSError), open("/proc/cpuinfo", "rb") as processors:
         if b" avx2 " in processors.read(4096):  # of the first one
             _ENVIRONMENT["OPENBLAS_CORETYPE"] = "Haswell"
@@ -102,7 +104,7 @@ def use_one_thread() -> None:
     because all workers of a study must compute the same results.
     """
     os.environ.update(_ENVIRONMENT)
-    for name in ("OMP_NUM", "OPENBLAS_NUM", "MKL_NUM", "TF_NUM_INTEROP"):
+    for name in ("OMP_NUM", "MKL_NUM", "TF_NUM_INTEROP"):
         os.environ[f"{name}_THREADS"] = "1"
 
 

@@ -36,6 +36,8 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 Refusal = Callable[[Callable[[list[str]], int], Sequence[object]], str]
 
 
+# The threads of torch wait for each other with all their power where other tests need the cores.
+os.environ["OMP_NUM_THREADS"] = "1"
 # A shell starts a background job with Ctrl-C ignored, and so would every command in the tests.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 # Libraries ask the standard input for its encoding, and pytest has none where it is closed.

@@ -8,11 +8,12 @@ import numpy as np
 
 from keras_pendulum.diagnosis.faults import Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
-from keras_pendulum.diagnosis.played_agent import STARTS
+from keras_pendulum.diagnosis.played_agent import STARTS, PlayedAgent
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.states import Act, observation_changes
 
-LIKELY_CHANGES = (
+# Of a slow policy, only these of `observation_changes` are tried.
+_LIKELY_CHANGES = (
     "cos θ, sin θ, -θ̇",
     "sin θ, cos θ, θ̇",
     "-cos θ, sin θ, θ̇",
@@ -21,7 +22,6 @@ LIKELY_CHANGES = (
     "x, θ, ẋ, θ̇",
     "x, ẋ, θ·180/π, θ̇·180/π",
 )
-
 
 _FACTORS = {"half the torque": 0.5, "double the torque": 2.0}
 _FEW_STARTS = 4  # to choose the changes that are played on all
@@ -44,17 +44,17 @@ def mask_outputs(m: Measurement, masked: list[int]) -> Repair:
     )
 
 
-def change_observations(m: Measurement, name: str) -> Repair:
+def change_observations(m: PlayedAgent, name: str) -> Repair:
     """Plays the agent with a changed observation, one of `observation_changes`."""
     change = observation_changes(m.dynamics)[name]
     return _play(m, f"observation [{name}]", lambda observations: m.act(observations @ change))
 
 
-def _scale_efforts(m: Measurement, name: str, factor: float) -> Repair:
+def _scale_efforts(m: PlayedAgent, name: str, factor: float) -> Repair:
     return _play(m, name, lambda observations: factor * m.act(observations))
 
 
-def find_by_repairs(m: Measurement) -> list[Finding]:
+def find_by_repairs(m: PlayedAgent) -> list[Finding]:
     """Returns the finding on a policy without Q-values: the simple change that helps most.
 
     Where the policy is fast, each change is tried on a few starts, also each order and sign of the
@@ -62,7 +62,7 @@ def find_by_repairs(m: Measurement) -> list[Finding]:
     """
     factors = {f"{m.dynamics.effort} reversed": -1.0} | (_FACTORS if m.dynamics.any_effort else {})
     changes = observation_changes(m.dynamics)
-    scaled, changed = list(factors), [name for name in LIKELY_CHANGES if name in changes]
+    scaled, changed = list(factors), [name for name in _LIKELY_CHANGES if name in changes]
     if m.start_count == STARTS:
         few = replace(m, start_count=_FEW_STARTS)
         scaled = [min(scaled, key=lambda name: _scale_efforts(few, name, factors[name]).regret)]
@@ -76,6 +76,6 @@ def find_by_repairs(m: Measurement) -> list[Finding]:
     return [Finding(name, evidence, "no change helps", best)]
 
 
-def _play(m: Measurement, name: str, act: Act) -> Repair:
+def _play(m: PlayedAgent, name: str, act: Act) -> Repair:
     regret = m.optimum - float(m.play(act).returns.mean())
     return Repair(name, regret, m.regret - regret)

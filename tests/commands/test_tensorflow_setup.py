@@ -32,6 +32,20 @@ print(sorted(name for name in os.environ if name.startswith(("TF_", "XLA_", "ONE
 for _ in range(2):
     warn_if_not_reproducible()
 """
+# Prints the sum of the bytes of Q-values, which differ with the number of threads.
+Q_VALUES = """
+import sys, zlib
+import keras_pendulum
+from keras_pendulum import tensorflow_setup
+if "worker" in sys.argv:
+    tensorflow_setup.use_one_thread()
+import numpy as np
+from keras_pendulum.dqn.policy import GreedyPolicy
+random = np.random.RandomState(0)
+shapes = (3, 512), (512,), (512, 256), (256,), (256, 128), (128,), (128, 41), (41,)
+policy = GreedyPolicy([random.randn(*shape).astype("f") / 8 for shape in shapes], "tanh")
+print(zlib.crc32(policy.q_values(random.randn(100, 3).astype("f")).tobytes()))
+"""
 OWN = {
     "ONEDNN_MAX_CPU_ISA": "ALL",
     "TF_ENABLE_ONEDNN_OPTS": "1",
@@ -40,7 +54,7 @@ OWN = {
 }
 
 
-def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def run(code: str, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """Runs code in a process without variables of TensorFlow and NumPy."""
     clean = {
         name: value
@@ -48,7 +62,7 @@ def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
         if name not in _ENVIRONMENT and not name.startswith("TF_")
     }
     return subprocess.run(
-        [sys.executable, "-c", code, *_ENVIRONMENT],
+        [sys.executable, "-c", code, *words],
         env=clean | environment,
         capture_output=True,
         text=True,
@@ -58,7 +72,12 @@ def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("own", [{}, OWN])
 def test_import_sets_the_variables_that_the_user_has_not_set(own: dict[str, str]) -> None:
-    assert json.loads(run(CODE, **own).stdout) == _ENVIRONMENT | own
+    assert json.loads(run(CODE, *_ENVIRONMENT, **own).stdout) == _ENVIRONMENT | own
+
+
+@pytest.mark.skipif(os.cpu_count() == 1, reason="needs two cores to compute on two threads")
+def test_a_batch_has_the_q_values_of_a_worker_of_a_study() -> None:
+    assert run(Q_VALUES).stdout == run(Q_VALUES, "worker").stdout != ""
 
 
 def test_tensorflow_imported_before_is_left_alone_with_one_warning() -> None:

@@ -45,8 +45,8 @@ def make_job(seed: int) -> Job:
 
 
 def describe_worker(job: Job) -> Reply:
-    """Returns the worker's number of OpenMP threads and its process."""
-    return Reply(os.environ["OMP_NUM_THREADS"].encode(), 0, 0, 0, str(os.getpid()))
+    """Returns a number of threads that Dask does not set by itself, and the worker's process."""
+    return Reply(os.environ.get("TF_NUM_INTEROP_THREADS", "").encode(), 0, 0, 0, str(os.getpid()))
 
 
 FAILURES = {0: 99, 1: 1}  # killed workers by seed
