@@ -23,6 +23,7 @@ from keras_pendulum.diagnosis.constant_futures import (
     constant_futures_with_ends,
 )
 from keras_pendulum.diagnosis.equation import RIGHT, Equation
+from keras_pendulum.diagnosis.faults import ADDED_CONSTANT
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.diagnosis.target_equations import TARGETS
@@ -73,10 +74,8 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             "",
             f"{line.slope:.3g}·r + {line.offset:.3g} + γ·max Q(s′, ·)",
             lambda b: b.right + (line.slope - 1) * b.reward + line.offset,
-            "A constant is added to the rewards, so all values are higher than possible. In an "
-            "episode that never ends, this changes no decision.",
-            "Leave the constant out, or keep it: it is no reason for a low return here. Train for "
-            "longer, with a learning rate that falls.",
+            ADDED_CONSTANT.explanation,
+            ADDED_CONSTANT.remedy,
             largest_error=0.15,
             share=0.5,
         )
@@ -100,9 +99,9 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             task = visited.dynamics.task.with_gravity(gravity)
             equation = _changed("other-gravity", f"g = {gravity:g}", task=task)
             # After a short training, values are as smooth as at a low gravity. But then the
-            # advantages agree no better.
-            low = replace(equation, share=0.55, like_short_training=True)
-            yield low if gravity < own else equation
+            # advantages agree no better. Targets of several steps look like a higher one.
+            equation = replace(equation, like_short_training=True)
+            yield replace(equation, share=0.55) if gravity < own else equation
     # The sign of the correlation is the main evidence.
     yield _changed(
         "torque-map", f"{visited.dynamics.effort}s reversed", share=0.95, efforts=-visited.efforts

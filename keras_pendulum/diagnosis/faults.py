@@ -15,6 +15,13 @@ class Fault(NamedTuple):
     explains: tuple[str, ...] = ()  # other faults: what shows them is a trace of this one
 
 
+ADDED_CONSTANT = Fault(  # of `reward-scale`
+    "A constant is added to the rewards, so all values are higher than possible. In an episode "
+    "that never ends, this changes no decision.",
+    "Leave the constant out, or keep it: it is no reason for a low return here. Train for longer, "
+    "with a learning rate that falls.",
+)
+
 # `findings.find` leaves out what a fault explains in this order.
 _TRACES = (
     "too-few-updates",

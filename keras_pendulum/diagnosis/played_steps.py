@@ -75,9 +75,20 @@ class PlayedSteps(NamedTuple):
         for difference in pairs:
             both_greedy = (np.mean(difference <= _CLOSE) - chance) / (1 - chance)
             bounds.append(1 - np.sqrt(max(0.0, both_greedy)))
-        counts = np.bincount(nearest(effort, levels), minlength=len(levels))
-        rare = np.sort(counts)[: (len(levels) + 1) // 2].mean() * len(levels) / len(rows)
-        return float(min(*bounds, rare))
+        return float(min(*bounds, self._rare_share(rows)))
+
+    def _rare_share(self, rows: NDArray[np.intp]) -> float:
+        """Returns the share of random actions, were all efforts as frequent as the rare half.
+
+        The steps are dealt to two halves. One shows which efforts are rare, and the other how
+        often they are: in the same steps, the rarest ones are rarer than they should be.
+        """
+        count = len(self.levels)
+        number = nearest(self.effort[rows], self.levels)
+        halves = [np.bincount(number[first::2], minlength=count) for first in (0, 1)]
+        rare = [np.argsort(half, kind="stable")[: (count + 1) // 2] for half in halves]
+        both = halves[0][rare[1]].mean() + halves[1][rare[0]].mean()
+        return float(both * count / len(rows))
 
     def episodes(self) -> list[slice]:
         """Returns the rows of each recorded episode, in order of time.

@@ -22,6 +22,7 @@ _ROWS = 300  # states with an action each
 _REPEATS = 4  # of each row, because a policy may be random
 _LARGEST_ERROR = 0.8
 _SHARE = 0.7  # of the error of the right equation
+_SHARE_OF_BOTH = 0.9  # the same where one step fits better, too
 _SHARE_OF_SECOND = 0.95  # of that of the next best equation, in both errors together
 _LOWER = -0.25  # spreads: how much lower the values are than those of the greedy policy
 
@@ -47,10 +48,11 @@ def followed_policy(m: Measurement) -> Finding | None:
         each: (m.equation_errors[each.formula] * error) ** 0.5 for each, error in errors.items()
     }
     equation, second = sorted(both, key=both.__getitem__)[:2]
-    own = errors[equation]
+    own, one_step = errors[equation], m.equation_errors[equation.formula]
+    share = _SHARE_OF_BOTH if one_step < equation.share * m.right_agreement.error else _SHARE
     if both[equation] > _SHARE_OF_SECOND * both[second]:
         return None
-    if own > min(_LARGEST_ERROR, _SHARE * right.error):
+    if own > min(_LARGEST_ERROR, share * right.error):
         return None
     evidence = (
         f"over {_STEPS} steps, the values satisfy {equation.formula} to {percent(own)} and "

@@ -9,8 +9,12 @@ import numpy as np
 
 from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.played_steps import PARTS
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.transition_rules import OLD_STATE
+
+_LONG_RUN = 4000  # steps: 20 episodes of the pendulum
+_CONSTANT_EPSILON = 0.1  # of many programs that learn
 
 
 def old_state(m: Measurement) -> Finding | None:
@@ -55,15 +59,17 @@ def exploration(m: Measurement) -> Finding | None:
         if first < 0.1:
             return Finding("exploration", f"ε of the first fifth {first:.2f}", "above 0.3")
         return None
-    if r.played is None or (shares := r.played.random_shares()) is None:
+    if r.played is None or r.steps is None or (shares := r.played.random_shares()) is None:
         return None
     first, last = float(shares[0]), float(shares[-2:].mean())
-    if last > 0.7:
+    # A program that is stopped early has random actions at its end, too, but not more of them.
+    if last > 0.7 and (r.steps >= _LONG_RUN or last > first + 0.3):
         evidence = f"about {last:.0%} of the actions of the last fifth are random"
         return Finding("exploration", evidence, "below 10 %")
-    if first < 0.35 and len(r.played.effort) == r.steps:
+    chance = (_CONSTANT_EPSILON * (1 - _CONSTANT_EPSILON) * PARTS / r.steps) ** 0.5
+    if first < _CONSTANT_EPSILON - 1.5 * chance and len(r.played.effort) == r.steps:
         evidence = f"at most {first:.0%} of the actions of the first tenth are random"
-        return Finding("exploration", evidence, "above 50 %")
+        return Finding("exploration", evidence, "above 10 %")
     return None
 
 

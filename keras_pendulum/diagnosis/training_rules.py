@@ -36,7 +36,8 @@ def untrained_outputs(m: Measurement) -> Finding | None:
                 repairs.mask_outputs(m, missing),
             )
     odd = np.flatnonzero(m.outliers > max(10.0, 0.3 * m.outliers.max())).tolist()
-    if odd and len(odd) <= len(m.outliers) / 4 and m.outliers.max() > 14:
+    picked = bool(odd) and m.learned_q[:, odd].mean() > np.delete(m.learned_q, odd, axis=1).mean()
+    if picked and len(odd) <= len(m.outliers) / 4 and m.outliers.max() > 14:
         return Finding(
             "untrained-outputs",
             f"mean error of the outputs {', '.join(map(str, odd))} {m.outliers.max():.0f} times "

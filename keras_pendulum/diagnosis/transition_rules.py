@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis import repairs
-from keras_pendulum.diagnosis.faults import FAULTS, Fault, Finding
+from keras_pendulum.diagnosis.faults import ADDED_CONSTANT, FAULTS, Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.motion import FEW
 from keras_pendulum.diagnosis.run_record import RunRecord
@@ -178,12 +178,15 @@ def _torque_map(m: Measurement, found: Array, kind: str, name: str) -> Finding:
 
 
 def _other_rewards(m: Measurement, r: RunRecord, rewards: StoredRewards) -> Finding | None:
-    slope, _, correlation = rewards.fit
+    slope, constant, correlation = rewards.fit
     if correlation > 0.999:
         # A recorder sees the rewards before the program scales them.
         declared = r.is_buffer or not 0.5 < slope * m.reward_scale < 2
         if not 0.5 < slope < 2 and declared:
             evidence = f"stored rewards {slope:.3g} times the declared ones"
+            if m.task.never_terminates and abs(constant) > 0.01 * abs(slope):
+                evidence += f" plus {constant:.3g}"
+                return Finding("reward-scale", evidence, "1 and 0", text=ADDED_CONSTANT)
             return Finding("reward-scale", evidence, "1")
         if correlation > 0.9999:
             return None

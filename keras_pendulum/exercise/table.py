@@ -153,11 +153,11 @@ EXERCISES: dict[int, Exercise] = {
     13: Exercise(
         CARTPOLE,
         "From the first episode on the agent does the same again and again.",
-        (("np.interp(done, (0, 0.5), EPSILON)", "np.interp(step, (0, 0.5), EPSILON)"),),
+        (("np.interp(done, (0, 0.5), EPSILON)", "np.interp(done, (0, 0.5), EPSILON) / 100"),),
         "exploration",
-        "Print ε in the first ten episodes.",
+        "How many of the first 1000 actions are random? How many should be?",
         "[16]",
-        "ε is computed from the step in place of the share of the run, so it falls in one step.",
+        "ε is a share, not a percentage. Do not divide it by 100.",
     ),
     14: Exercise(
         PENDULUM,

@@ -229,6 +229,19 @@ def test_transitions_show_the_mistake(finding: str, change: Any, run: Any) -> No
     assert first(None, change(run)) == finding
 
 
+def test_constant_that_is_added_to_the_stored_rewards_is_named(run: Any) -> None:
+    measured = measure(
+        bad_values,
+        make_record(None, stored(run, r=buffer_of(run)[2] / 8 + 1), TORQUES, PENDULUM),
+    )
+    finding = transition_rules.stored_transitions(measured)
+    assert (
+        finding is not None
+        and finding.evidence == "stored rewards 0.125 times the declared ones plus 1"
+    )
+    assert "Leave the constant out" in finding.remedy
+
+
 @pytest.mark.parametrize("share", [0.8, 1.2])
 def test_declared_reward_scale_is_that_of_the_buffer(share: float, run: Any) -> None:
     rewards = stored(run, r=0.1 * share * buffer_of(run)[2])
@@ -252,9 +265,9 @@ def test_batch_drawn_at_random_is_no_missing_replay(run: Any) -> None:
 @pytest.mark.parametrize(
     ("finding", "options"),
     [
-        ("exploration", {"epsilon": lambda done: 1.0}),
-        ("exploration", {"epsilon": lambda done: done}),
-        ("exploration", {"epsilon": lambda done: 0.01}),
+        ("exploration", {"epsilon": lambda done: 1.0, "episodes": 40}),
+        ("exploration", {"epsilon": lambda done: done, "episodes": 40}),
+        ("exploration", {"epsilon": lambda done: 0.01, "episodes": 40}),
         ("narrow-starts", {"reset": {"x_init": 0.1, "y_init": 0.1}, "steps": 10, "episodes": 300}),
         ("other-gravity", {"gravity": 10.0}),
         (
@@ -343,13 +356,25 @@ def test_policy_without_values_is_judged_by_its_record(run: Any) -> None:
     assert found(narrow) == ["narrow-starts"]
 
 
+@pytest.mark.parametrize(
+    ("episodes", "epsilon"),
+    [
+        (20, lambda done: 0.1),
+        (100, lambda done: 0.1),
+        (20, lambda done: 0.95 - 0.2 * done),  # stopped before ε has fallen
+    ],
+)
+def test_usual_exploration_is_no_fault(episodes: int, epsilon: Callable[[float], float]) -> None:
+    assert first(record_run(episodes=episodes, epsilon=epsilon)) == "nothing"
+
+
 def test_record_may_be_a_file_and_on_the_command_line(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from keras_pendulum.diagnosis.__main__ import main
 
     monkeypatch.chdir(tmp_path)
-    record_run(episodes=30, epsilon=lambda done: 1.0).save("run.npz")
+    record_run(episodes=40, epsilon=lambda done: 1.0).save("run.npz")
     Path("mine.py").write_text(
         "import numpy as np\n"
         "import keras_pendulum as kp\n"
