@@ -37,6 +37,7 @@ class Equation:
     change: dict[str, Any] | None = None  # arguments of `Visited.backup`
     label: str = ""  # what differs from the declared task
     discount: float | None = None  # γ, where it differs
+    slope: float | None = None  # of the values over the exact ones, where it says one
     # The next action whose value the target takes: from Q-values [N, A] to indices [N].
     next_action: NextAction | None = None
 

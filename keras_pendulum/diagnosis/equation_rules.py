@@ -18,6 +18,8 @@ RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _GROWN = 3.0  # spreads above the best possible value
 _UNRELATED = 0.5  # error of the right equation
 _SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
+_RIGHT_VALUES = 0.9  # correlation with the exact values
+_OTHER_SLOPE = 1.7  # times the slope that the equation says
 _DIVERGED = 20.0  # spreads above the best possible value: no equation has this fixed point
 HEALTHY = f"{RIGHT} to 1 to 7 %"
 
@@ -65,7 +67,12 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         return actions is not None and actions.declared > comparisons.SAME_ACTIONS
 
     def is_refuted(equation: Equation) -> bool:
-        """Returns whether the record of the run shows that this equation is not its own."""
+        """Returns whether the exact values or the record show that this equation is not its own."""
+        if equation.name == "observation-map" and m.value.correlation > _RIGHT_VALUES:
+            return True
+        # The values of a few steps, which a short training has, obey one with smaller rewards.
+        if equation.slope is not None and m.value.slope > _OTHER_SLOPE * equation.slope:
+            return True
         if m.record is None:
             return False
         if equation.name in ("observation-map", "torque-map"):

@@ -64,6 +64,7 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             lambda b: b.right + (factor - 1) * b.reward,
             largest_error=0.25 if positive else 0.12,
             share=0.5 if positive else 0.75,
+            slope=factor if 0 < factor < 1 else None,
         )
     line, goes_on = declared.reward_line, visited.dynamics.task.never_terminates
     top = line.offset / max(1 - visited.discount, 0.005)  # the value of rewards that stay 0
@@ -87,7 +88,8 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
                 f"r + {discount:g}·max Q(s′, ·)",
                 partial(_discounted, discount),
                 largest_error=0.07,
-                share=0.4,
+                # After few copies of the target network, values look less far ahead.
+                share=0.2 if discount < visited.discount else 0.4,
                 discount=discount,
             )
     error = declared.q - declared.right

@@ -157,6 +157,8 @@ def silu(values: Any) -> Any:
         ("mean", relu, 11, {"gravity": 10.0, "discount": 0.95}),
         # With targets of three steps.
         ("several_steps", relu, 9, {"gravity": 1.0, "discount": 0.98, "reward_scale": 1 / 16.2736}),
+        ("few_copies", relu, 3, {"gravity": 1.0, "discount": 0.98, "reward_scale": 1 / 8}),
+        ("chance", relu, 9, {"gravity": 1.0, "discount": 0.99}),
         ("output", relu, 41, {"gravity": 10.0, "discount": 0.99, "reward_scale": 0.1}),
         ("pole", silu, None, {"environment": "CartPole-v1", "discount": 0.95}),
         ("second_pole", relu, None, {"environment": "CartPole-v1", "discount": 0.99}),
