@@ -51,7 +51,8 @@ def _offset_equations(declared: Backup) -> Iterator[Equation]:
         "r + a small constant",
         constant,
         "The values are the rewards of one step plus a little that changes slowly with the next "
-        "state. That is γ·max of a network that never learns: the target network is never copied.",
+        "state. That is γ·max of a network that has not learned: the target network is never "
+        "copied, or the training ended before its first copy.",
         "Copy the online weights into the target network, every 100 to 1000 updates or a little at "
         "each one.",
         share=0.2,
