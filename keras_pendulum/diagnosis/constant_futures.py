@@ -95,16 +95,16 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
     small = (
         not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
     )
-    # Nothing is added at an end. After a short training, the values there are not right either.
-    small = small and abs(end - size) < 0.35 * size
     # What an index adds can be as smooth, where batches mix 0 and 1. But it need not be small at 0,
     # and it differs from state to state, while the values of such a network may hardly differ.
     never_learned = declared.offset_at_zero < 0.3 and (smooth or spread < 0.06 * size)
     index = small and mean > 0 and not never_learned
+    # Nothing is added at an end. After a short training, the values there are not right either.
+    right_at_ends = abs(end - size) < 0.15 * size
     for equation in _offset_equations(declared):
         offsets = {
             "no-bootstrapping": none,
-            "frozen-target": small and not index and abs(end - size) < 0.15 * size,
+            "frozen-target": small and not index and right_at_ends,
             "index-for-value": index,
             "batch-max": mean > 2 * size and spread < 0.12 * mean and end < 0.5 * mean,
         }

@@ -73,7 +73,7 @@ class Equation:
         if own.error > min(error, share * right.error) or own.correlation < correlation:
             return False
         if self.name == "missing-end":
-            return 0.9 < own.at_ends < 1.5
+            return own.at_ends > 0.9
         if self.name == "torque-map":
             return right.correlation < -0.6
         if self.name == "observation-map":

@@ -107,7 +107,7 @@ def growth_beyond_ends(m: Measurement) -> Finding | None:
         return None
     right = m.right_agreement
     for own, equation in m.agreements:
-        beyond = equation.name == "missing-end" and 0.9 < own.at_ends < 1.5
+        beyond = equation.name == "missing-end" and own.at_ends > 0.9
         if beyond and own.error < 0.6 * right.error:
             evidence = (
                 f"values of {m.backup.q.mean():.2g}, and {percent(own.at_ends)} of it in the last "

@@ -64,7 +64,7 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             lambda b: b.right + (factor - 1) * b.reward,
             largest_error=0.25 if positive else 0.12,
             share=0.5 if positive else 0.75,
-            slope=factor if 0 < factor < 1 else None,
+            slope=factor if 0 < factor < 1 and visited.dynamics.task.never_terminates else None,
         )
     line, goes_on = declared.reward_line, visited.dynamics.task.never_terminates
     top = line.offset / max(1 - visited.discount, 0.005)  # the value of rewards that stay 0
