@@ -22,7 +22,8 @@ _ROWS = 300  # states with an action each
 _REPEATS = 4  # of each row, because a policy may be random
 _LARGEST_ERROR = 0.8
 _SHARE = 0.7  # of the error of the right equation
-_SHARE_OF_BOTH = 0.9  # the same where one step fits better, too
+_SHARE_OF_BOTH = 0.9  # the same where one step fits better, too, and advantages have been learned
+_LEARNED = 0.4  # correlation of the advantages
 _SHARE_OF_SECOND = 0.95  # of that of the next best equation, in both errors together
 _LOWER = -0.25  # spreads: how much lower the values are than those of the greedy policy
 
@@ -49,7 +50,9 @@ def followed_policy(m: Measurement) -> Finding | None:
     }
     equation, second = sorted(both, key=both.__getitem__)[:2]
     own, one_step = errors[equation], m.equation_errors[equation.formula]
-    share = _SHARE_OF_BOTH if one_step < equation.share * m.right_agreement.error else _SHARE
+    fits = one_step < equation.share * m.right_agreement.error
+    learned = m.right_agreement.correlation > _LEARNED
+    share = _SHARE_OF_BOTH if fits and learned else _SHARE
     if both[equation] > _SHARE_OF_SECOND * both[second]:
         return None
     if own > min(_LARGEST_ERROR, share * right.error):
