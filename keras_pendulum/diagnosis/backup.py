@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.signals import Array, Fit, advantages, line_fit
 from keras_pendulum.diagnosis.states import observation_changes
+from keras_pendulum.environments.pendulum import MAX_SPEED
 from keras_pendulum.environments.task import Task
 from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
@@ -24,6 +25,7 @@ class Backup(NamedTuple):
     discount: float  # γ
     next_observation: NDArray[np.float32]  # [N · A, D]
     continues: NDArray[np.bool_]  # [N, A]: whether the step does not terminate the episode
+    reward_scale: float = 1.0  # the program's outputs are the values times this factor
 
     @property
     def right(self) -> Array:
@@ -78,6 +80,18 @@ class Backup(NamedTuple):
         return float(self.offset[distance <= np.quantile(distance, 0.1)].mean())
 
     @property
+    def offset_by_next_state(self) -> Array:
+        """What a polynomial of the next observation explains of `offset`, for the pendulum, [M]."""
+        cosine, sine, speed = self.next_observation[self.continues.ravel()].astype(float).T
+        speed = speed / MAX_SPEED
+        powers = [(i, j) for i in range(6) for j in range(6 - i)]
+        even = np.column_stack([sine**i * speed**j for i, j in powers])
+        odd = np.column_stack([cosine * sine**i * speed**j for i, j in powers if i + j < 5])
+        terms = np.column_stack([even, odd])  # cos² is 1 - sin²
+        solution, *_ = np.linalg.lstsq(terms, self.offset, rcond=None)
+        return np.asarray(terms @ solution)
+
+    @property
     def reward_line(self) -> Fit:
         """The line over the rewards that obeys the right equation best in their place.
 
@@ -105,6 +119,7 @@ class Visited:
     efforts: Array  # of the outputs, [A]
     dynamics: KnownDynamics
     discount: float  # γ
+    reward_scale: float = 1.0  # as in `Backup`
 
     def backup(
         self,
@@ -133,7 +148,9 @@ class Visited:
         reward, ended = outcomes.reward, outcomes.terminated
         if ended.any():  # many programs give the last step a penalty, which is no mistake
             reward = np.where(ended, min(float(reward.mean()), float(q[ended].mean())), reward)
-        return Backup(q, reward, next_q, self.discount, next_observation, ~ended)
+        return Backup(
+            q, reward, next_q, self.discount, next_observation, ~ended, self.reward_scale
+        )
 
 
 class Agreement(NamedTuple):

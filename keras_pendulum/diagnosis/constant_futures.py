@@ -18,25 +18,40 @@ from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
 
 def constant_futures(declared: Backup) -> Iterator[Equation]:
     """Yields the equations in which a constant takes the place of the next values."""
-    offset, last = declared.offset, declared.q.shape[1] - 1
-    mean = float(offset.mean())
-    small = 0.06 < offset.std() < 0.25 * declared.q.std()
+    scale, last = declared.reward_scale, declared.q.shape[1] - 1
+    output = declared.offset * scale  # as the program adds an index, or what has not learned
+    mean, spread = float(output.mean()), float(output.std())
+    small = 0.06 < spread < 0.25 * scale * declared.q.std()
     frozen = bool(small and declared.offset_is_smooth and -0.1 < mean < 2)
     line = line_fit(declared.q, declared.reward)
     usual = 0.6 < line.slope < 1.3
     # No reward is positive, so no other target adds positive numbers that differ.
-    indices = bool(np.mean((offset > -2) & (offset < declared.discount * last + 1)) > 0.8)
-    rewards = line.correlation > 0.7 and 0.45 < line.slope < 1.8
-    indices = indices and (rewards or float(declared.q.mean()) > 1)
-    indices = indices and not frozen and mean > 0.3 and float(offset.std()) > 0.2
+    indices = bool(np.mean((output > -2) & (output < declared.discount * last + 1)) > 0.8)
+    # After a short training, values are as near to the rewards, but agree with them less.
+    rewards = line.correlation > 0.85 and 0.45 < line.slope < 1.8
+    indices = indices and (rewards or float(declared.q.mean()) * scale > 0.5)
+    indices = indices and not frozen and mean > 0.3 and spread > 0.33
+    nothing = abs(float(declared.offset.mean())) < 0.1
     found = {
-        "no-bootstrapping": usual and not frozen and abs(mean) < 0.1,
+        "no-bootstrapping": usual and not frozen and nothing,
         "frozen-target": usual and frozen,
-        "batch-max": usual and not frozen and not indices and abs(mean) >= 0.1,
+        "batch-max": usual and not frozen and not indices and not nothing,
         "index-for-value": indices,
     }
+    positive = bool(np.mean(output > 0) > 0.9) and mean < 2
     for equation in _offset_equations(declared):
         yield replace(equation, offset=found[equation.variant or equation.name])
+        if equation.variant == "frozen-target" and not indices:
+            yield replace(
+                equation,
+                formula="r + a number above 0 that the next state sets",
+                target=lambda b: b.reward + b.offset_by_next_state.reshape(b.q.shape),
+                explanation="The values are the rewards of one step plus numbers above 0. No "
+                "reward is above 0, so no values are that have learned. These are γ·max of a "
+                "network that has not: the target network is never copied, or the training ended "
+                "before its first copy.",
+                offset=positive,
+            )
 
 
 def _offset_equations(declared: Backup) -> Iterator[Equation]:

@@ -55,8 +55,10 @@ class Equation:
         if self.change is not None and own.mean > 0:
             return False  # no reward of the pendulum is positive, whatever its gravity
         if self.like_short_training and own.error > _SATISFIED:
-            is_clear = own.error < 0.45 * right.error and own.correlation > right.correlation
-            if not is_clear:
+            is_far = own.error < 0.45 * right.error
+            is_far = is_far and own.correlation > min(right.correlation, 0.5)
+            is_learned = right.correlation > 0.6 and own.correlation > right.correlation + 0.06
+            if not (is_far or is_learned):
                 return False
         if self.change is None and not 0.8 < own.position < 1.35:
             return False
@@ -70,6 +72,8 @@ class Equation:
     def _explains_ends(self, own: Agreement, right: Agreement) -> bool:
         """Returns the same for a task whose episodes terminate: its values show more."""
         error, share, correlation = _LIMITS_WITH_ENDS.get(self.name, (0.2, 0.5, 0.8))
+        if self.variant:
+            share = min(share, self.share)
         if own.error > min(error, share * right.error) or own.correlation < correlation:
             return False
         if self.name == "missing-end":

@@ -20,7 +20,7 @@ _UNRELATED = 0.5  # error of the right equation
 _SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
 _RIGHT_VALUES = 0.9  # correlation with the exact values
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
-_DIVERGED = 20.0  # spreads above the best possible value: no equation has this fixed point
+_DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
 HEALTHY = f"{RIGHT} to 1 to 7 %"
 
 
@@ -57,7 +57,7 @@ class Obeyed(NamedTuple):
 def obeyed_equation(m: Measurement) -> Obeyed | None:
     """Returns the equation that the values obey clearly better than the right one."""
     right = m.right_agreement
-    if m.excess > _DIVERGED or right.error < RIGHT_ERROR:
+    if right.error < RIGHT_ERROR:
         return None
     agreements = m.agreements
 
@@ -68,6 +68,8 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
 
     def is_refuted(equation: Equation) -> bool:
         """Returns whether the exact values or the record show that this equation is not its own."""
+        if m.excess > _DIVERGED and equation.variant != "frozen-target":
+            return True
         if equation.name == "observation-map" and m.value.correlation > _RIGHT_VALUES:
             return True
         # The values of a few steps, which a short training has, obey one with smaller rewards.

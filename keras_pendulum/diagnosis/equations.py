@@ -29,7 +29,7 @@ from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.diagnosis.target_equations import TARGETS
 
 _GRAVITIES = (0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0)  # m/s²
-_DISCOUNTS = (0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995)
+_DISCOUNTS = (0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
 
 
 def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, Equation]]:

@@ -53,7 +53,9 @@ class Measurement(PlayedAgent):
     def visited(self) -> Visited:
         """The network at the states that it visits itself, with random actions."""
         states = visited_states(self.q_values, self.efforts, self.dynamics, self.starts)
-        return Visited(self.q_values, states, self.efforts, self.dynamics, self.discount)
+        return Visited(
+            self.q_values, states, self.efforts, self.dynamics, self.discount, self.reward_scale
+        )
 
     @cached_property
     def backup(self) -> Backup:

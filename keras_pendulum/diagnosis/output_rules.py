@@ -172,7 +172,7 @@ def reward_size(m: Measurement) -> Finding | None:
     slope = m.value.slope
     if mean < 0.04 * float(m.exact_q.mean()):
         return None  # a training begins with the mean of the values
-    if 0 <= slope < 0.02 and m.advantage_size < 0.03 and m.value.correlation > 0.5:
+    if 0 <= slope < 0.02 and m.advantage_size < 0.03 and m.value.correlation > 0.85:
         evidence = f"values {slope:.1g} times the exact ones, and actions as close"
         return Finding("reward-scale", evidence, "1")
     return None

@@ -74,6 +74,25 @@ TARGETS = (
     ),
     Equation(
         "wrong-target",
+        "same-action-next",
+        "r + γ·Q(s′, a)",
+        lambda b: b.reward + b.future * np.diagonal(b.next_q, axis1=1, axis2=2),
+        "The target takes the next value of the action that was taken before, so values are those "
+        f"of an agent that never changes its action. {_TARGET}",
+        f"{_TAKE_MAXIMUM} gather with the stored action is for Q(s, a) alone.",
+        share=0.25,
+    ),
+    Equation(
+        "wrong-target",
+        "negative-next",
+        "r - γ·max Q(s′, ·)",
+        lambda b: b.reward - b.future * b.next_q.max(axis=2),
+        "The target subtracts the next values, so a good next state makes a value worse.",
+        "Add the next values: r + γ·max Q(s′, ·).",
+        share=0.2,
+    ),
+    Equation(
+        "wrong-target",
         "same-state",
         "r + γ·max Q(s, ·)",
         lambda b: b.reward + b.future * b.q.max(axis=1, keepdims=True),

@@ -37,6 +37,10 @@ def first(diagnosis: kp.Diagnosis) -> str:
 TARGETS: dict[str, Any] = {
     "wrong-target (mean-next)": lambda r, following, own: r + 0.9 * following.mean(axis=2),
     "wrong-target (min-next)": lambda r, following, own: r + 0.9 * following.min(axis=2),
+    "wrong-target (same-action-next)": lambda r, following, own: (
+        r + 0.9 * np.diagonal(following, axis1=1, axis2=2)
+    ),
+    "wrong-target (negative-next)": lambda r, following, own: r - 0.9 * following.max(axis=2),
     "wrong-target (same-state)": lambda r, following, own: r + 0.9 * own.max(axis=1, keepdims=True),
     "wrong-loss (zero-others)": lambda r, following, own: right(r, following, own) / len(TORQUES),
     "wrong-loss (same-target)": lambda r, following, own: (
@@ -110,7 +114,7 @@ def test_right_program_that_has_not_converged_is_not_blamed(sweeps: int) -> None
 
 
 def short_training(name: str, activation: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Returns the Q-values of a network that a PyTorch program without a fault has made."""
+    """Returns the Q-values of a network that another program has made."""
     with np.load(DATA / "short_trainings.npz") as arrays:
         count = sum(each.rpartition("_")[0] == name for each in arrays.files)
         weights = [arrays[f"{name}_{place}"].astype(np.float32) for place in range(count)]
@@ -160,6 +164,8 @@ def silu(values: Any) -> Any:
         ("few_copies", relu, 3, {"gravity": 1.0, "discount": 0.98, "reward_scale": 1 / 8}),
         ("chance", relu, 9, {"gravity": 1.0, "discount": 0.99}),
         ("output", relu, 41, {"gravity": 10.0, "discount": 0.99, "reward_scale": 0.1}),
+        ("hundred_updates", np.tanh, 11, {"gravity": 10.0, "discount": 0.985}),
+        ("few_updates", np.tanh, 11, {"gravity": 10.0, "discount": 0.985}),
         ("pole", silu, None, {"environment": "CartPole-v1", "discount": 0.95}),
         ("second_pole", relu, None, {"environment": "CartPole-v1", "discount": 0.99}),
     ],
@@ -171,6 +177,14 @@ def test_short_training_gets_the_name_of_no_part_that_is_right(
     actions = None if torques is None else np.linspace(-2, 2, torques)
     function = kp.q_function(short_training(name, activation), actions, "a student's")
     assert first(kp.diagnose(function, **declared)) in ("not-converged", "no finding")
+
+
+def test_target_network_of_a_program_that_never_copies_it_is_named() -> None:
+    """The program multiplies the rewards by 0.02, so its first values are 50 times as large."""
+    function = kp.q_function(short_training("frozen", relu), np.linspace(-2, 2, 11), "a student's")
+    diagnosis = kp.diagnose(function, gravity=10.0, discount=0.985, reward_scale=0.02)
+    assert first(diagnosis) == "wrong-target (frozen-target)"
+    assert "the values satisfy r + a number above 0 that the next state sets" in diagnosis.verdict
 
 
 @pytest.mark.parametrize("sweeps", [5, 10, 20])
@@ -259,6 +273,16 @@ def test_target_network_that_is_never_copied_is_named() -> None:
     values = fixed_point(TARGETS["no-bootstrapping"])
     diagnosis = diagnose(lambda o: values(o) + 0.3 + 0.9 * (o @ UNTRAINED).max(axis=1)[:, None])
     assert first(diagnosis) == "wrong-target (frozen-target)"
+
+
+@pytest.mark.parametrize("scale", [1, 0.1, 0.02])
+def test_target_network_that_is_never_copied_is_named_with_small_rewards(scale: float) -> None:
+    values = fixed_point(TARGETS["no-bootstrapping"])
+
+    def q_values(o: Any) -> Any:
+        return scale * values(o) + 0.4 + 0.9 * (o @ UNTRAINED).max(axis=1)[:, None]
+
+    assert first(diagnose(q_values, reward_scale=scale)) == "wrong-target (frozen-target)"
 
 
 def test_index_in_place_of_the_value_is_named() -> None:

@@ -10,7 +10,7 @@ from program_runs import result_of
 from keras_pendulum.exercise.check import answer
 from keras_pendulum.exercise.program import exercise, program
 
-STEPS = 2_500
+STEPS = 1_600
 SHOWN = (2, 4, 5, 6, 7, 8, 9, 12, 13, 14, 15, 16, 18, 19)
 
 

@@ -13,12 +13,11 @@ from keras_pendulum.exercise.program import exercise, program
 from keras_pendulum.exercise.table import CARTPOLE, EXERCISES, PENDULUM
 
 STEPS = 8_000
-LEARNED = (1, 3, 10, 11, 17)
-NOT_NAMED = (20,)  # `diagnose` says `not-converged`; docs/teaching.md says so
+LEARNED = (1, 3, 10, 11, 17, 20)
 
 
 def test_every_exercise_has_a_test() -> None:
-    assert sorted((*SHOWN, *LEARNED, *NOT_NAMED)) == list(EXERCISES)
+    assert sorted((*SHOWN, *LEARNED)) == list(EXERCISES)
 
 
 @pytest.mark.parametrize("number", LEARNED)
@@ -27,14 +26,6 @@ def test_diagnosis_names_the_fault_first(number: int, tmp_path: Path) -> None:
     result = result_of(program(number), each.environment, STEPS, tmp_path)
     assert result["findings"][0]["name"] == each.finding, result["verdict"]
     assert not answer(number, result)[0]
-
-
-@pytest.mark.parametrize("number", NOT_NAMED)
-def test_fault_without_a_name_is_not_healthy(number: int, tmp_path: Path) -> None:
-    result = result_of(program(number), exercise(number).environment, 2_500, tmp_path)
-    healthy, text = answer(number, result)
-    assert not healthy
-    assert text.startswith("Not healthy yet: regret ")
 
 
 def test_program_without_a_fault_is_healthy(tmp_path: Path) -> None:
