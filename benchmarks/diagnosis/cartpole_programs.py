@@ -67,6 +67,10 @@ _MISTAKES = {
     ),
     "the tutorial's, no lookahead": _mistake("no-bootstrapping", target="none", **_TUTORIAL),
     "the tutorial's, end not stored": _mistake("missing-end", ends_never=True, **_TUTORIAL),
+    "next value of the action before": _mistake(
+        "wrong-target", "same-action-next", target="same-action"
+    ),
+    "next values subtracted": _mistake("wrong-target", "negative-next", target="negative"),
 }
 _RIGHT: dict[str, dict[str, Any]] = {
     "right": {},

@@ -48,9 +48,9 @@ class KerasNetwork:
             q = self.online(s)
             chosen = tf.gather(q, a, batch_dims=1)
             if program.through_target:
-                target = self._targets(self.online(following), q, r, end)
+                target = self._targets(self.online(following), q, a, r, end)
             else:
-                target = self._targets(self._target(following), self._target(s), r, end)
+                target = self._targets(self._target(following), self._target(s), a, r, end)
             if program.loss == "chosen":
                 loss = tf.reduce_mean((chosen - target) ** 2)
             elif program.loss == "same-target":
@@ -64,13 +64,15 @@ class KerasNetwork:
         self._adam.apply_gradients(zip(tape.gradient(loss, variables), variables, strict=True))
         return [variable.value for variable in variables]
 
-    def _targets(self, following: Any, same: Any, r: Any, end: Any) -> Any:
+    def _targets(self, following: Any, same: Any, a: Any, r: Any, end: Any) -> Any:
         values = {
             "max": lambda: tf.reduce_max(following, 1),
             "mean": lambda: tf.reduce_mean(following, 1),
             "min": lambda: tf.reduce_min(following, 1),
             "first": lambda: following[:, 0],
             "last": lambda: following[:, -1],
+            "same-action": lambda: tf.gather(following, a, batch_dims=1),
+            "negative": lambda: -tf.reduce_max(following, 1),
             "batch-max": lambda: tf.reduce_max(following),
             "index": lambda: tf.cast(tf.argmax(following, 1), tf.float32),
             "same-state": lambda: tf.reduce_max(same, 1),

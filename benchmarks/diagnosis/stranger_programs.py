@@ -62,6 +62,7 @@ class Program:
     # What its author believes:
     declared_gravity: float | None = None
     declared_discount: float | None = None
+    declared_scale: float | None = None  # of the rewards
 
     @property
     def is_cartpole(self) -> bool:
@@ -158,6 +159,11 @@ MISTAKES: dict[str, Mistake] = {
     "index of the next torque stored": _shown("torque-map", "transitions", stores_next_index=True),
     "a constant added to the rewards": Mistake(
         {"reward": lambda reward: (reward + 8.1) / 8.1}, "reward-scale"
+    ),
+    "next value of the action before": _wrong_target("same-action-next", target="same-action"),
+    "next values subtracted": _wrong_target("negative-next", target="negative"),
+    "target network never copied, rewards times 0.02": _wrong_target(
+        "frozen-target", copy_every=0, reward=lambda reward: 0.02 * reward, declared_scale=0.02
     ),
 }
 

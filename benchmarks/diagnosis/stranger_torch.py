@@ -46,10 +46,10 @@ class TorchNetwork:
         q = self.online(s)
         chosen = q.gather(1, a[:, None])[:, 0]
         if program.through_target:
-            target = self._targets(self.online(following), q, r, end)
+            target = self._targets(self.online(following), q, a, r, end)
         else:
             with torch.no_grad():
-                target = self._targets(self._target(following), self._target(s), r, end)
+                target = self._targets(self._target(following), self._target(s), a, r, end)
         if program.loss == "chosen":
             loss = ((chosen - target) ** 2).mean()
         elif program.loss == "same-target":
@@ -70,7 +70,7 @@ class TorchNetwork:
                 ):
                     ours.lerp_(theirs, share)
 
-    def _targets(self, following: Any, same: Any, r: Any, end: Any) -> Any:
+    def _targets(self, following: Any, same: Any, a: Any, r: Any, end: Any) -> Any:
         kind = self._program.target
         values: dict[str, Callable[[], Any]] = {
             "max": lambda: following.max(1).values,
@@ -78,6 +78,8 @@ class TorchNetwork:
             "min": lambda: following.min(1).values,
             "first": lambda: following[:, 0],
             "last": lambda: following[:, -1],
+            "same-action": lambda: following.gather(1, a[:, None])[:, 0],
+            "negative": lambda: -following.max(1).values,
             "batch-max": lambda: following.max(),
             "index": lambda: following.argmax(1).float(),
             "same-state": lambda: same.max(1).values,

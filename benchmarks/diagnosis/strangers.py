@@ -101,6 +101,7 @@ def diagnose_program(kind: str, seed: int, folder: Path) -> Result:
         kp.q_function(trained.q_values, torques, f"{kind} {seed}"),
         gravity=None if program.is_cartpole else program.declared_gravity or program.gravity,
         discount=program.declared_discount or program.discount,
+        reward_scale=program.declared_scale,
         record=program_files(kind, seed, folder)[1] if "record" in hand_in else None,
         transitions=[trained.steps[each] for each in names] if "transitions" in hand_in else None,
     )

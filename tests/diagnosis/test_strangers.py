@@ -54,9 +54,9 @@ def test_programs_of_both_libraries_learn_the_same_targets() -> None:
         np.zeros(5, np.float32),
     )
     mistakes: list[dict[str, Any]] = [
-        {"target": name} for name in ("max", "mean", "min", "first", "batch-max")
+        {"target": name}
+        for name in ("max", "mean", "min", "first", "same-action", "negative", "batch-max", "index")
     ] + [
-        {"target": "index"},
         {"loss": "same-target"},
         {"loss": "zero-others"},
         {"loss": "broadcast"},
