@@ -31,7 +31,7 @@ def constant_futures(declared: Backup) -> Iterator[Equation]:
     rewards = line.correlation > 0.85 and 0.45 < line.slope < 1.8
     indices = indices and (rewards or float(declared.q.mean()) * scale > 0.5)
     indices = indices and not frozen and mean > 0.3 and spread > 0.33
-    nothing = abs(float(declared.offset.mean())) < 0.1
+    nothing = abs(float(declared.offset.mean())) < max(0.1, float(declared.offset.std()))
     found = {
         "no-bootstrapping": usual and not frozen and nothing,
         "frozen-target": usual and frozen,

@@ -275,6 +275,13 @@ def test_target_network_that_is_never_copied_is_named() -> None:
     assert first(diagnosis) == "wrong-target (frozen-target)"
 
 
+@pytest.mark.parametrize("mean", [-0.2, 0.2])
+def test_rewards_with_an_error_have_no_constant_added(mean: float) -> None:
+    values, waves = fixed_point(TARGETS["no-bootstrapping"]), 50 * UNTRAINED
+    diagnosis = diagnose(lambda o: values(o) + mean + 0.4 * np.sin(o @ waves))
+    assert first(diagnosis) == "no-bootstrapping"
+
+
 @pytest.mark.parametrize("scale", [1, 0.1, 0.02])
 def test_target_network_that_is_never_copied_is_named_with_small_rewards(scale: float) -> None:
     values = fixed_point(TARGETS["no-bootstrapping"])
