@@ -148,9 +148,7 @@ class Visited:
         reward, ended = outcomes.reward, outcomes.terminated
         if ended.any():  # many programs give the last step a penalty, which is no mistake
             reward = np.where(ended, min(float(reward.mean()), float(q[ended].mean())), reward)
-        return Backup(
-            q, reward, next_q, self.discount, next_observation, ~ended, self.reward_scale
-        )
+        return Backup(q, reward, next_q, self.discount, next_observation, ~ended, self.reward_scale)
 
 
 class Agreement(NamedTuple):
