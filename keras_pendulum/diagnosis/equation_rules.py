@@ -19,6 +19,7 @@ _GROWN = 3.0  # spreads above the best possible value
 _UNRELATED = 0.5  # error of the right equation
 _SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
 _RIGHT_VALUES = 0.9  # correlation with the exact values
+_BY_CHANCE = 0.1  # correlation of advantages that have not been learned
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
 _DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
 HEALTHY = f"{RIGHT} to 1 to 7 %"
@@ -71,6 +72,10 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         if m.excess > _DIVERGED and equation.variant != "frozen-target":
             return True
         if equation.name == "observation-map" and m.value.correlation > _RIGHT_VALUES:
+            return True
+        # The first values of a right program pass those with an index. But they learn actions.
+        ends = not m.task.never_terminates
+        if ends and equation.variant == "index-for-value" and m.advantage.correlation > _BY_CHANCE:
             return True
         # The values of a few steps, which a short training has, obey one with smaller rewards.
         if equation.slope is not None and m.value.slope > _OTHER_SLOPE * equation.slope:

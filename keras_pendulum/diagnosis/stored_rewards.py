@@ -33,10 +33,16 @@ class StoredRewards:
 
     @property
     def fit(self) -> Fit:
-        """The line through stored over exact rewards; constant ones that are equal fit, too."""
+        """The line through stored over exact rewards; constant ones that are equal fit, too.
+
+        Constant ones are those of CartPole. There, many programs give the last step a penalty,
+        which is no mistake.
+        """
         if not np.ptp(self.exact):
-            slope = float(np.median(self.stored) / self.exact[0])
-            close = np.abs(self.stored - slope * self.exact) < 0.01 * abs(slope)
+            goes_on = ~self.record.replay.terminated
+            stored = self.stored[goes_on] if goes_on.any() else self.stored
+            slope = float(np.median(stored) / self.exact[0])
+            close = np.abs(stored - slope * self.exact[0]) < 0.01 * abs(slope)
             return Fit(slope, 0.0, float(np.sign(slope) * close.mean()))
         return line_fit(self.stored, self.exact)
 

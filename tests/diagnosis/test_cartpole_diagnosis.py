@@ -135,6 +135,14 @@ def test_transitions_show_the_mistake(finding: str, change: Any) -> None:
     assert finding not in first(useless, transitions=transitions())
 
 
+def test_penalty_for_the_fall_is_no_fault() -> None:
+    s, a, r, following, ended = transitions()
+    punished = [s, a, np.where(ended, -10.0, r), following, ended]
+    assert first(exact_values, transitions=punished) == "no finding"
+    notes = kp.diagnose("cartpole", transitions=punished).notes
+    assert "other-reward" not in {each.name for each in notes}
+
+
 def test_shipped_agent_has_no_finding() -> None:
     diagnosis = kp.diagnose("cartpole")
     assert diagnosis.findings == []

@@ -82,6 +82,31 @@ def before(record: RunRecord, field: str) -> RunRecord:
     return changed(record, **{field: np.roll(getattr(record.replay, field), 1, axis=0)})
 
 
+def with_several_steps(record: RunRecord, steps: int, sums: bool = True) -> RunRecord:
+    """Returns transitions from a state to the one some steps later."""
+    replay, left = record.replay, 1 - steps
+    reward = replay.reward[:left].astype(float)
+    for later in range(1, steps if sums else 1):
+        reward += 0.9**later * replay.reward[later : left + later or None]
+    return changed(
+        record,
+        observation=replay.observation[:left],
+        action=replay.action[:left],
+        reward=reward,
+        next_observation=replay.next_observation[steps - 1 :],
+        terminated=replay.terminated[:left],
+    )
+
+
+@pytest.mark.parametrize("steps", [2, 3, 5])
+def test_rewards_and_states_of_several_steps_are_no_fault(record: RunRecord, steps: int) -> None:
+    found = diagnose_values(useless, with_several_steps(record, steps)).findings
+    names = {each.name for each in found}
+    assert not names & {"misaligned-transitions", "other-reward", "torque-map", "reward-scale"}
+    found = diagnose_values(useless, with_several_steps(record, steps, sums=False)).findings
+    assert found[0].name == "misaligned-transitions"
+
+
 @pytest.mark.parametrize(
     ("fault", "change"),
     [
