@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import pygame
 
 from keras_pendulum.figures.drawing import INK, LINE, PAPER, ROD, WHITE
 from keras_pendulum.figures.scene import Observation, Scene
 from keras_pendulum.figures.style import rgb, torque_color
-from keras_pendulum.optimum.cartpole_dynamics import FORCE, LARGEST_ANGLE, LARGEST_POSITION
+from keras_pendulum.optimum.cartpole_dynamics import LARGEST_ANGLE, LARGEST_POSITION
 
 _POLE = 1.0  # m, its length
 
@@ -18,22 +18,10 @@ _POLE = 1.0  # m, its length
 class CartPoleScene(Scene):
     """The cart on its track, with the push as an arrow."""
 
-    effort: ClassVar[str] = "force"
-    unit: ClassVar[str] = "N"
-    largest_effort: ClassVar[float] = FORCE
-    rightward: ClassVar[int] = 1
     directions: ClassVar[tuple[str, str]] = ("left", "right")
     return_digits: ClassVar[int] = 0
     angles: ClassVar[dict[float, str]] = {-LARGEST_ANGLE: "−12°", 0: "0°", LARGEST_ANGLE: "12°"}
     speeds: ClassVar[tuple[float, ...]] = (-3, -1.5, 0, 1.5, 3)
-
-    def effort_of_action(self, action: Any) -> float:
-        """Returns the force in N, to the right."""
-        return FORCE if action == 1 else -FORCE
-
-    def state(self, observation: Observation) -> tuple[float, float]:
-        """Returns θ in rad and θ̇ in rad/s, positive to the right."""
-        return float(observation[2]), float(observation[3])
 
     def draw(
         self, observation: Observation, effort: float, size: tuple[int, int]
