@@ -47,7 +47,7 @@ def test_200_steps_agree_with_gymnasium_and_the_policy(
             q = policy.q_values(observation)
             np.testing.assert_allclose(row["qValues"], q, rtol=0, atol=TOLERANCE)
             action = int(q.argmax())
-            page_action = grid.nearest_index(row["effort"])
+            page_action = int(np.abs(grid.torques - row["effort"]).argmin())
             if page_action != action and q[action] - q[page_action] < TIE:
                 action, ties = page_action, ties + 1
             observation, reward, _, over, _ = env.step(grid.to_env_action(action))
