@@ -16,11 +16,12 @@ from keras_pendulum.environments.pendulum import (
     pendulum_starts,
 )
 from keras_pendulum.environments.torque import MAX_TORQUE
-from keras_pendulum.optimum.discounted import discounted_value, exact_q
+from keras_pendulum.optimum.discounted import discounted_value
 from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
 from keras_pendulum.optimum.known_dynamics import KnownDynamics, Outcomes, Table
 from keras_pendulum.optimum.pendulum_returns import discounted_return
 from keras_pendulum.optimum.solution import RANDOM_EPISODES, Array
+from keras_pendulum.optimum.value_iteration import value_at
 
 
 class PendulumSolution(KnownDynamics):
@@ -80,9 +81,13 @@ class PendulumSolution(KnownDynamics):
         return discounted_value(self.task.gravity, discount)
 
     def exact_q(self, table: Table, discount: float, states: Array, efforts: Array) -> Array:
-        """Returns the Q-values [N, A]."""
+        """Returns the Q-values [N, A]: reward + γ V(next state).
+
+        The torques of all later steps are those of V: the best of 41.
+        """
         theta, speed = states.T
-        return exact_q(table, self.task.gravity, discount, theta, speed, efforts)
+        reward, theta, speed = step_all_torques(self.task.gravity, theta, speed, efforts)
+        return reward + discount * value_at(table, theta, speed)
 
     def greedy_efforts(self, table: Table, discount: float, states: Array) -> Array:
         """Returns the torques [N] in N·m, of the 41."""

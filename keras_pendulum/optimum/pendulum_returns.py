@@ -59,6 +59,6 @@ def discounted_return(
         missing = sorted({*seeds, *USUAL_SEEDS} - returns.keys())
         computed = compute_returns(problem, pendulum_starts(missing))
         returns |= zip(missing, computed.tolist(), strict=True)
-        values = np.array(list(returns.values()))
-        write_to_cache(cache, problem, seeds=np.array(list(returns)), returns=values)
+        arrays = {"seeds": np.array(list(returns)), "returns": np.array(list(returns.values()))}
+        write_to_cache(cache, problem._asdict() | arrays)
     return np.array([returns[seed] for seed in seeds], np.float64)
