@@ -9,7 +9,7 @@ import pygame
 
 from keras_pendulum.figures.drawing import INK, LINE, PAPER, ROD, WHITE
 from keras_pendulum.figures.scene import Observation, Scene
-from keras_pendulum.figures.style import rgb, torque_color
+from keras_pendulum.figures.style import torque_color
 from keras_pendulum.optimum.cartpole_dynamics import LARGEST_ANGLE, LARGEST_POSITION
 
 _POLE = 1.0  # m, its length
@@ -65,7 +65,7 @@ def _draw_track(picture: pygame.Surface, middle: float, track: float, meter: flo
 
 def _draw_push(picture: pygame.Surface, box: pygame.Rect, force: float, meter: float) -> None:
     """Draws an arrow below the cart, in the direction of the push."""
-    color, direction = rgb(torque_color(force)), math.copysign(1, force)
+    color, direction = torque_color(force), math.copysign(1, force)
     height = box.bottom + 0.3 * meter
     tail, head = (box.centerx + direction * each * meter for each in (-0.3, 0.2))
     pygame.draw.line(picture, color, (tail, height), (head, height), width=round(0.08 * meter))

@@ -11,7 +11,7 @@ import pygame
 
 from keras_pendulum.figures.drawing import INK, LARGE, LINE, PALE_INK, PAPER, ROD, WHITE, Writer
 from keras_pendulum.figures.scene import Observation, Scene
-from keras_pendulum.figures.style import rgb, torque_color
+from keras_pendulum.figures.style import torque_color
 
 if TYPE_CHECKING:
     import gymnasium
@@ -98,7 +98,7 @@ def _draw_effort(writer: Writer, bar: pygame.Rect, scene: Scene, effort: float) 
     pygame.draw.rect(screen, WHITE, bar)
     length = round(min(1.0, abs(effort) / scene.dynamics.largest_effort) * bar.width / 2)
     left = bar.centerx - (length if effort < 0 else 0)
-    pygame.draw.rect(screen, rgb(torque_color(effort)), (left, bar.top, length, bar.height))
+    pygame.draw.rect(screen, torque_color(effort), (left, bar.top, length, bar.height))
     pygame.draw.rect(screen, LINE, bar, width=1)
     pygame.draw.line(screen, INK, bar.midtop, bar.midbottom, width=2)
     negative, positive = scene.directions

@@ -12,7 +12,7 @@ from keras_pendulum.environments.pendulum import MAX_SPEED
 from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.figures.drawing import INK, PAPER, ROD, WHITE
 from keras_pendulum.figures.scene import Observation, Scene
-from keras_pendulum.figures.style import rgb, torque_color
+from keras_pendulum.figures.style import torque_color
 
 
 class PendulumScene(Scene):
@@ -52,7 +52,7 @@ def _draw_arrow(
 
     Its white border separates it from the rod, which is as dark.
     """
-    color, direction = rgb(torque_color(torque)), math.copysign(1, torque)
+    color, direction = torque_color(torque), math.copysign(1, torque)
     sweep = 0.75 * math.pi * abs(torque) / MAX_TORQUE
     points = []
     for i in range(121):

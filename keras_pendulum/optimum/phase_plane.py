@@ -91,6 +91,6 @@ def _coarse_table(task: Pendulum, discount: float) -> Table:
 def _rows(dynamics: KnownDynamics) -> NDArray[np.float64]:
     """Returns the states [POINTS, POINTS, S]. θ and θ̇ are the last two numbers; others are 0."""
     angles, speeds = (np.linspace(-end, end, POINTS) for end in dynamics.phase_ends)
-    states = np.zeros((POINTS, POINTS, len(dynamics.starts(range(1))[0])))
+    states = np.zeros((POINTS, POINTS, len(dynamics.task.starts(range(1))[0])))
     states[..., -2], states[..., -1] = angles, speeds[:, None]
     return states

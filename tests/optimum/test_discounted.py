@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum import best_return, discounted, pendulum_returns
 from keras_pendulum.optimum.discounted import discounted_value, solve_discounted
@@ -138,7 +138,7 @@ def test_shipped_returns_are_below_the_optimum_by_what_the_discount_costs(
 def test_shipped_returns_are_those_of_a_computation(solved: list[int]) -> None:
     shipped = discounted_return(1, 0.9, range(20))
     computed = best_return.compute_returns(
-        Problem.valid(1, discount=0.9), pendulum_starts(range(20))
+        Problem.valid(1, discount=0.9), Pendulum().starts(range(20))
     )
     assert computed.mean() == pytest.approx(shipped.mean(), abs=0.1)
     assert solved == [best_return.DISCOUNTED_CELLS]
