@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.result_files import Row, write
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, pendulum_starts
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.optimum.dynamics import step_all_torques
 from keras_pendulum.optimum.value_iteration import value_at, value_tables
 
@@ -30,7 +30,7 @@ def main(starts: int = 100) -> None:
     """Computes the returns and writes the table."""
     rows: list[Row] = []
     for gravity in (1.0, 10.0):
-        states = pendulum_starts(range(starts))
+        states = Pendulum().starts(range(starts))
         tables = {
             cells: next(
                 islice(

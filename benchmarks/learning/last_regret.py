@@ -29,7 +29,7 @@ from benchmarks.learning.last_regret_figure import draw
 from benchmarks.learning.variants import two_processes
 from benchmarks.result_files import ROOT, Row, write
 from keras_pendulum.dqn.policy import GreedyPolicy, greedy_policy
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, pendulum_starts
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
 from keras_pendulum.optimum.value_iteration import solve, value_at
 from keras_pendulum.study.arms import own_arms
@@ -84,7 +84,7 @@ def play(learned: QFunction, exact: QFunction, gravity: float, value: Array) -> 
         gravity: m/s².
         value: V without a discount, a table of `value_iteration`.
     """
-    theta, speed = pendulum_starts(STARTS).T
+    theta, speed = Pendulum().starts(STARTS).T
     rows, steps = np.arange(len(theta)), []
     for _ in range(STEPS_PER_EPISODE):
         q = learned(theta, speed)

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.optimum import episode_values
 from keras_pendulum.optimum.best_return import compute_returns
 from keras_pendulum.optimum.cartpole_values import file_name, pack, solve_cartpole
-from keras_pendulum.optimum.stored_results import Problem, write, write_arrays
+from keras_pendulum.optimum.stored_results import Problem, write_arrays
 
 DATA = Path(__file__).parents[2] / "keras_pendulum" / "optimum" / "data"
 # Gravity and discount of `reference` and `swingup`, with the steps of a whole and of a training
@@ -36,12 +36,12 @@ CARTPOLE_DISCOUNTS = (0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
 
 def main(folder: str = str(DATA)) -> None:
     """Computes returns and values, and writes the files into an existing folder."""
-    starts = pendulum_starts(range(10_000))
+    starts = Pendulum().starts(range(10_000))
     for problem in SHIPPED:
         seeds = range(10_000 if problem.discount == 1 else 1000)
         returns = compute_returns(problem, starts[: len(seeds)])
         path = Path(folder) / problem.file_name
-        write(path, problem, seeds=np.array(seeds), returns=returns)
+        write_arrays(path, {**problem._asdict(), "seeds": np.array(seeds), "returns": returns})
         print(f"{path}: mean {returns.mean():.4f}")
     for gravity in GRAVITIES:
         path = Path(folder) / episode_values.file_name(Problem.valid(gravity))

@@ -46,7 +46,7 @@ def draw_game() -> None:
     game.press(Key.POSITIVE)
     for _ in range(200 + 21):
         game.advance()
-    window.show(game.view())
+    window.show(game)
     surface = pygame.display.get_surface()
     assert surface is not None
     pygame.image.save(surface, str(_DOCS / "play.png"))

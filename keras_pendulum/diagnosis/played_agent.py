@@ -103,7 +103,7 @@ class PlayedAgent:
     @cached_property
     def starts(self) -> Array:
         """The starts [B, S] of the episodes."""
-        return self.dynamics.starts(range(self.start_count))
+        return self.task.starts(range(self.start_count))
 
     @cached_property
     def episodes(self) -> Episodes:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING, require_torque
+from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING
 from keras_pendulum.errors import ConfigError
 
 
@@ -67,15 +67,6 @@ class TorqueGrid(TorqueActions):
 
     def __init__(self, count: int = 41) -> None:
         super().__init__(np.linspace(-MAX_TORQUE, MAX_TORQUE, count))
-
-    def nearest_index(self, torque: float) -> int:
-        """Returns the index of the torque nearest to `torque` (N·m).
-
-        Raises ValueError for a torque that is not finite or outside ±2 N·m.
-        """
-        require_torque(torque)
-        step = 2 * MAX_TORQUE / (self.count - 1)
-        return round((torque + MAX_TORQUE) / step)
 
 
 class TruncatingTorqueGrid(TorqueActions):

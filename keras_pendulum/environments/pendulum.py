@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -28,8 +27,9 @@ LARGEST_GRAVITY = 100.0  # m/s²
 class Pendulum(Task):
     """A pendulum that a torque swings up. It never terminates.
 
-    The observation is [cos θ, sin θ, θ̇ in rad/s], θ = 0 upright. The action is [u], a torque in
-    N·m. The reward is -(θ² + 0.1 θ̇² + 0.001 u²). Raises ConfigError for a gravity out of range.
+    The state is [θ in rad, θ̇ in rad/s], θ = 0 upright. The observation is [cos θ, sin θ, θ̇]. The
+    action is [u], a torque in N·m. The reward is -(θ² + 0.1 θ̇² + 0.001 u²). Raises ConfigError for
+    a gravity out of range.
     """
 
     gravity: float = 1.0  # m/s², 0 to 100; Gymnasium's own default is 10
@@ -96,15 +96,3 @@ def validate_gravity(gravity: float) -> float:
         found = repr(gravity)[:50]
         raise ConfigError(f"gravity is {found}; expected a number from 0 to 100 (m/s²)")
     return float(gravity) + 0.0  # -0.0 becomes 0.0
-
-
-def pendulum_starts(seeds: Iterable[int]) -> NDArray[np.float64]:
-    """Returns the states [N, 2] (θ in rad, θ̇ in rad/s) of `reset(seed=…)` for N seeds."""
-    import numpy as np
-
-    env = Pendulum().make_env().unwrapped
-    states = []
-    for seed in seeds:
-        env.reset(seed=seed)
-        states.append(env.state)  # type: ignore[attr-defined]
-    return np.array(states, np.float64).reshape(-1, 2)

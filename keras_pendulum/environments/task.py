@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from keras_pendulum.display import require_display
@@ -10,6 +11,8 @@ from keras_pendulum.errors import ConfigError
 
 if TYPE_CHECKING:
     import gymnasium
+    import numpy as np
+    from numpy.typing import NDArray
 
     from keras_pendulum.environments.actions import Actions
 
@@ -86,6 +89,20 @@ class Task(ABC):
         raise ConfigError(
             f"--start belongs to Pendulum-v1; {self.environment} has none: use --seed"
         )
+
+    def starts(self, seeds: Iterable[int]) -> NDArray[np.float64]:
+        """Returns the states [N, S] of `reset(seed=…)` for N seeds, at least one.
+
+        The environment has its state in the attribute `state`.
+        """
+        import numpy as np
+
+        env: Any = self.make_env().unwrapped
+        states = []
+        for seed in seeds:
+            env.reset(seed=seed)
+            states.append(env.state)
+        return np.array(states, np.float64)
 
     def make_env(
         self, render_mode: str | None = None, steps: int | None = None

@@ -12,13 +12,12 @@ from PIL import Image
 
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.figures.drawing import LARGE, PALE_INK, PAPER, Writer
-from keras_pendulum.figures.moment import BELOW, Moment, draw_moment
+from keras_pendulum.figures.moment import BELOW, ShownEpisode, draw_moment
 from keras_pendulum.figures.scenes import scene
 from keras_pendulum.optimum.solutions import solution
 
 if TYPE_CHECKING:
     from keras_pendulum.environments.task import Task
-    from keras_pendulum.figures.scene import Scene
 
 _log = logging.getLogger(__name__)
 
@@ -46,38 +45,19 @@ def film_episode(
             optimum = solution(task).best_return_at(angle)
         policy.reset()
         writer = Writer(pygame.Surface(SIZE))
-        path = [drawn.state(observation)]
-        step, effort, reward, total, done = 0, 0.0, 0.0, 0.0, False
-        while True:
-            moment = Moment(
-                observation=observation,
-                effort=effort,
-                step=step,
-                steps=task.steps_per_episode,
-                reward=reward,
-                total_reward=total,
-                optimal_return=optimum,
-                path=path,
-            )
-            yield draw_frame(writer, drawn, titles, moment)
-            if done:
-                return
-            action = policy.action(observation)
-            observation, given, terminated, truncated, _ = env.step(action)
-            reward, effort = float(given), drawn.effort_of_action(action)
-            done = terminated or truncated
-            step, total = step + 1, total + reward
-            path.append(drawn.state(observation))
+        episode = ShownEpisode(drawn, env, observation, optimum)
+        yield draw_frame(writer, titles, episode)
+        while not episode.done:
+            episode.step(policy.action(episode.observation))
+            yield draw_frame(writer, titles, episode)
 
 
-def draw_frame(
-    writer: Writer, drawn: Scene, titles: tuple[str, str], moment: Moment
-) -> Image.Image:
+def draw_frame(writer: Writer, titles: tuple[str, str], episode: ShownEpisode) -> Image.Image:
     """Returns the picture of a step, under its titles; the writer's surface has the SIZE."""
     screen, write = writer.screen, writer.write
     screen.fill(PAPER)
     write(titles[0], (16, 11), LARGE)
     write(titles[1], (_WIDTH - 16, 14), align=1.0, color=PALE_INK)
     place = pygame.Rect(0, _TOP, _WIDTH, _HEIGHT - _TOP)
-    draw_moment(screen, write, place, drawn, moment)
+    draw_moment(writer, place, episode)
     return Image.frombytes("RGB", SIZE, pygame.image.tobytes(screen, "RGB"))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import pygame
 
 from keras_pendulum.figures.drawing import INK, LINE, PAPER, ROD, WHITE
 from keras_pendulum.figures.scene import Observation, Scene
-from keras_pendulum.figures.style import rgb, torque_color
-from keras_pendulum.optimum.cartpole_dynamics import FORCE, LARGEST_ANGLE, LARGEST_POSITION
+from keras_pendulum.figures.style import torque_color
+from keras_pendulum.optimum.cartpole_dynamics import LARGEST_ANGLE, LARGEST_POSITION
 
 _POLE = 1.0  # m, its length
 
@@ -18,22 +18,10 @@ _POLE = 1.0  # m, its length
 class CartPoleScene(Scene):
     """The cart on its track, with the push as an arrow."""
 
-    effort: ClassVar[str] = "force"
-    unit: ClassVar[str] = "N"
-    largest_effort: ClassVar[float] = FORCE
-    rightward: ClassVar[int] = 1
     directions: ClassVar[tuple[str, str]] = ("left", "right")
     return_digits: ClassVar[int] = 0
     angles: ClassVar[dict[float, str]] = {-LARGEST_ANGLE: "−12°", 0: "0°", LARGEST_ANGLE: "12°"}
     speeds: ClassVar[tuple[float, ...]] = (-3, -1.5, 0, 1.5, 3)
-
-    def effort_of_action(self, action: Any) -> float:
-        """Returns the force in N, to the right."""
-        return FORCE if action == 1 else -FORCE
-
-    def state(self, observation: Observation) -> tuple[float, float]:
-        """Returns θ in rad and θ̇ in rad/s, positive to the right."""
-        return float(observation[2]), float(observation[3])
 
     def draw(
         self, observation: Observation, effort: float, size: tuple[int, int]
@@ -77,7 +65,7 @@ def _draw_track(picture: pygame.Surface, middle: float, track: float, meter: flo
 
 def _draw_push(picture: pygame.Surface, box: pygame.Rect, force: float, meter: float) -> None:
     """Draws an arrow below the cart, in the direction of the push."""
-    color, direction = rgb(torque_color(force)), math.copysign(1, force)
+    color, direction = torque_color(force), math.copysign(1, force)
     height = box.bottom + 0.3 * meter
     tail, head = (box.centerx + direction * each * meter for each in (-0.3, 0.2))
     pygame.draw.line(picture, color, (tail, height), (head, height), width=round(0.08 * meter))

@@ -1,120 +1,130 @@
-"""A step of an episode as the game and films show it: scene, phase portrait and numbers."""
+"""An episode as the game and films show it: scene, phase portrait and numbers of each step."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import pygame
 
-from keras_pendulum.figures.drawing import INK, LARGE, LINE, PALE_INK, PAPER, ROD, WHITE
+from keras_pendulum.figures.drawing import INK, LARGE, LINE, PALE_INK, PAPER, ROD, WHITE, Writer
 from keras_pendulum.figures.scene import Observation, Scene
-from keras_pendulum.figures.style import rgb, torque_color
+from keras_pendulum.figures.style import torque_color
+
+if TYPE_CHECKING:
+    import gymnasium
 
 BELOW = 96  # pixels below the pictures, for the effort and the numbers
 States = Sequence[tuple[float, float]]  # θ (rad) and θ̇ (rad/s)
-Write = Callable[..., None]  # `Writer.write`
 
 _PATH, _EARLIER = (25, 25, 25), (150, 150, 150)
 _FINE = 2  # pixels of a drawing for each on the screen, for smooth edges
 
 
-@dataclass(frozen=True)
-class Moment:
-    """The state and the numbers of a step."""
+@dataclass
+class ShownEpisode:
+    """An episode of a task, from an observation on."""
 
+    scene: Scene
+    env: gymnasium.Env[Any, Any]
     observation: Observation  # [D]
-    effort: float  # of the last step
-    step: int
-    steps: int  # of a whole episode
-    reward: float  # of the last step
-    total_reward: float  # the return so far
-    optimal_return: float  # of a whole episode
-    path: States  # so far; the last state is present
-    earlier_path: States = ()  # of another episode
+    optimal_return: float  # from the start on
+    effort: float = 0.0  # of the last step: a torque in N·m, or a force in N
+    steps: int = 0
+    reward: float = 0.0  # of the last step
+    total_reward: float = 0.0  # the undiscounted return so far
+    done: bool = False
+
+    def __post_init__(self) -> None:
+        self.path = [self.scene.state(self.observation)]  # the last state is present
+
+    def step(self, action: Any) -> None:
+        """Takes one step with an action of the environment."""
+        self.observation, reward, terminated, truncated, _ = self.env.step(action)
+        self.effort, self.reward = self.scene.effort_of_action(action), float(reward)
+        self.total_reward += self.reward
+        self.steps += 1
+        self.path.append(self.scene.state(self.observation))
+        self.done = terminated or truncated
 
 
 def draw_moment(
-    screen: pygame.Surface, write: Write, place: pygame.Rect, scene: Scene, moment: Moment
+    writer: Writer, place: pygame.Rect, episode: ShownEpisode, earlier_path: States = ()
 ) -> None:
     """Draws the scene, the phase portrait beside it, and the numbers below.
 
     Args:
-        screen: to draw on.
-        write: of a `Writer` for the same surface.
+        writer: has the surface to draw on.
         place: the rectangle to fill.
-        scene: of the task.
-        moment: to show.
+        episode: after its last step.
+        earlier_path: of another episode.
     """
+    screen, scene = writer.screen, episode.scene
     left = pygame.Rect(place.left, place.top, place.width // 2, place.height - BELOW)
-    screen.blit(scene.draw(moment.observation, moment.effort, left.size), left)
+    screen.blit(scene.draw(episode.observation, episode.effort, left.size), left)
     right = left.move(left.width, 0)
     pygame.draw.rect(screen, WHITE, right)
-    draw_portrait(screen, write, right, scene, moment.path, moment.earlier_path)
+    draw_portrait(writer, right, scene, episode.path, earlier_path)
     # A strip along the lower edge shows the elapsed share of the episode.
-    width = place.width * moment.step // moment.steps
+    all_steps = scene.task.steps_per_episode
+    width = place.width * episode.steps // all_steps
     pygame.draw.rect(screen, LINE, (place.left, left.bottom - 4, width, 4))
     bar = pygame.Rect(0, left.bottom + 16, round(0.56 * left.width), 18)
     bar.centerx = left.centerx
-    _draw_effort(screen, write, bar, scene, moment.effort)
+    _draw_effort(writer, bar, scene, episode.effort)
     numbers = {
-        scene.effort: f"{_signed(moment.effort)} {scene.unit}",
-        "step": f"{moment.step} of {moment.steps}",
-        "reward": f"{moment.reward:z.3f}",
-        "return": scene.show_return(moment.total_reward),
-        "best possible": scene.show_return(moment.optimal_return),
+        scene.dynamics.effort: f"{_signed(episode.effort)} {scene.dynamics.unit}",
+        "step": f"{episode.steps} of {all_steps}",
+        "reward": f"{episode.reward:z.3f}",
+        "return": scene.show_return(episode.total_reward),
+        "best possible": scene.show_return(episode.optimal_return),
     }
     column = place.width / len(numbers)
     for i, (name, text) in enumerate(numbers.items()):
         middle = place.left + round((i + 0.5) * column)
-        write(name, (middle, bar.bottom + 16), align=0.5, color=PALE_INK)
-        write(text.replace("-", "−"), (middle, bar.bottom + 35), LARGE, align=0.5)
+        writer.write(name, (middle, bar.bottom + 16), align=0.5, color=PALE_INK)
+        writer.write(text.replace("-", "−"), (middle, bar.bottom + 35), LARGE, align=0.5)
 
 
 def _signed(effort: float) -> str:
     return f"{effort:+.1f}" if abs(effort) >= 0.05 else "0.0"
 
 
-def _draw_effort(
-    screen: pygame.Surface, write: Write, bar: pygame.Rect, scene: Scene, effort: float
-) -> None:
+def _draw_effort(writer: Writer, bar: pygame.Rect, scene: Scene, effort: float) -> None:
     """Draws a bar from the middle; a positive effort points to the right."""
+    screen = writer.screen
     pygame.draw.rect(screen, WHITE, bar)
-    length = round(min(1.0, abs(effort) / scene.largest_effort) * bar.width / 2)
+    length = round(min(1.0, abs(effort) / scene.dynamics.largest_effort) * bar.width / 2)
     left = bar.centerx - (length if effort < 0 else 0)
-    pygame.draw.rect(screen, rgb(torque_color(effort)), (left, bar.top, length, bar.height))
+    pygame.draw.rect(screen, torque_color(effort), (left, bar.top, length, bar.height))
     pygame.draw.rect(screen, LINE, bar, width=1)
     pygame.draw.line(screen, INK, bar.midtop, bar.midbottom, width=2)
     negative, positive = scene.directions
-    write(negative, (bar.left - 10, bar.top), align=1.0)
-    write(positive, (bar.right + 10, bar.top))
+    writer.write(negative, (bar.left - 10, bar.top), align=1.0)
+    writer.write(positive, (bar.right + 10, bar.top))
 
 
 def draw_portrait(
-    screen: pygame.Surface,
-    write: Write,
-    place: pygame.Rect,
-    scene: Scene,
-    path: States,
-    earlier: States,
+    writer: Writer, place: pygame.Rect, scene: Scene, path: States, earlier: States
 ) -> None:
     """Draws the phase portrait: speed over angle, with the path of the episode.
 
     Args:
-        screen: to draw on.
-        write: of a `Writer` for the same surface.
+        writer: has the surface to draw on.
         place: the rectangle for the portrait and its labels.
         scene: has the limits of the axes.
         path: of the episode so far, dark; its last state is a dot.
         earlier: of another episode, pale.
     """
+    screen, write = writer.screen, writer.write
     frame = pygame.Rect(place.left + 66, place.top + 30, place.width - 90, place.height - 96)
     largest = max(scene.angles), max(scene.speeds)
 
     def pixel(state: tuple[float, float]) -> pygame.Vector2:
         x, y = (value / end for value, end in zip(state, largest, strict=True))
-        x *= scene.rightward  # what leans to the right is on the right
+        x *= scene.dynamics.rightward  # what leans to the right is on the right
         return pygame.Vector2((1 + x) * frame.width / 2, (1 - y) * frame.height / 2)
 
     plane = pygame.Surface((_FINE * frame.width, _FINE * frame.height))

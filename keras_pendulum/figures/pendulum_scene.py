@@ -4,69 +4,45 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
-import numpy as np
 import pygame
 
 from keras_pendulum.environments.pendulum import MAX_SPEED
 from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.figures.drawing import INK, PAPER, ROD, WHITE
 from keras_pendulum.figures.scene import Observation, Scene
-from keras_pendulum.figures.style import rgb, torque_color
+from keras_pendulum.figures.style import torque_color
 
 
 class PendulumScene(Scene):
     """The pendulum, with its torque as an arrow around the pivot."""
 
-    effort: ClassVar[str] = "torque"
-    unit: ClassVar[str] = "N·m"
-    largest_effort: ClassVar[float] = MAX_TORQUE
-    rightward: ClassVar[int] = -1
     directions: ClassVar[tuple[str, str]] = ("clockwise", "counterclockwise")
     return_digits: ClassVar[int] = 1
     angles: ClassVar[dict[float, str]] = {-math.pi: "−180°", 0: "0° (upright)", math.pi: "180°"}
     speeds: ClassVar[tuple[float, ...]] = (-MAX_SPEED, -4, 0, 4, MAX_SPEED)
 
-    def effort_of_action(self, action: Any) -> float:
-        """Returns the torque in N·m."""
-        return float(np.reshape(action, -1)[0])
-
-    def state(self, observation: Observation) -> tuple[float, float]:
-        """Returns θ, -π to π, and θ̇."""
-        cosine, sine, speed = map(float, observation)
-        return math.atan2(sine, cosine), speed
-
     def draw(
         self, observation: Observation, effort: float, size: tuple[int, int]
     ) -> pygame.Surface:
         """Returns a picture of the pendulum and of its torque."""
-        return draw_pendulum(self.state(observation)[0], effort, size)
-
-
-def draw_pendulum(angle: float, torque: float, size: tuple[int, int]) -> pygame.Surface:
-    """Returns a picture of the pendulum and of its torque, an arrow around the pivot.
-
-    Args:
-        angle: θ in rad, counterclockwise from upright.
-        torque: N·m, of the last step.
-        size: of the picture, in pixels.
-    """
-    width, height = 2 * size[0], 2 * size[1]
-    picture = pygame.Surface((width, height))
-    picture.fill(WHITE)
-    middle = pygame.Vector2(width / 2, height / 2)
-    length, thick = 0.38 * height, 0.05 * height
-    pygame.draw.circle(picture, PAPER, middle, length + thick, width=3)
-    end = middle + length * pygame.Vector2(-math.sin(angle), -math.cos(angle))
-    side = thick * pygame.Vector2(math.cos(angle), -math.sin(angle))
-    pygame.draw.polygon(picture, ROD, [middle + side, end + side, end - side, middle - side])
-    for place in (middle, end):
-        pygame.draw.circle(picture, ROD, place, thick)
-    pygame.draw.circle(picture, INK, middle, 0.4 * thick)
-    if torque:
-        _draw_arrow(picture, middle, 0.2 * height, torque)
-    return pygame.transform.smoothscale(picture, size)
+        angle, _ = self.state(observation)
+        width, height = 2 * size[0], 2 * size[1]
+        picture = pygame.Surface((width, height))
+        picture.fill(WHITE)
+        middle = pygame.Vector2(width / 2, height / 2)
+        length, thick = 0.38 * height, 0.05 * height
+        pygame.draw.circle(picture, PAPER, middle, length + thick, width=3)
+        end = middle + length * pygame.Vector2(-math.sin(angle), -math.cos(angle))
+        side = thick * pygame.Vector2(math.cos(angle), -math.sin(angle))
+        pygame.draw.polygon(picture, ROD, [middle + side, end + side, end - side, middle - side])
+        for place in (middle, end):
+            pygame.draw.circle(picture, ROD, place, thick)
+        pygame.draw.circle(picture, INK, middle, 0.4 * thick)
+        if effort:
+            _draw_arrow(picture, middle, 0.2 * height, effort)
+        return pygame.transform.smoothscale(picture, size)
 
 
 def _draw_arrow(
@@ -76,7 +52,7 @@ def _draw_arrow(
 
     Its white border separates it from the rod, which is as dark.
     """
-    color, direction = rgb(torque_color(torque)), math.copysign(1, torque)
+    color, direction = torque_color(torque), math.copysign(1, torque)
     sweep = 0.75 * math.pi * abs(torque) / MAX_TORQUE
     points = []
     for i in range(121):

@@ -1,4 +1,4 @@
-"""A task as the game and films draw it: its picture, its effort and its phase plane."""
+"""A task as the game and films draw it: its picture, its directions and its phase portrait."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.task import Task
+from keras_pendulum.optimum.solutions import known_dynamics
 
 if TYPE_CHECKING:
     import pygame
@@ -18,12 +19,8 @@ Observation = NDArray[np.float32]
 
 
 class Scene(ABC):
-    """The drawings of a task. A further one has a subclass in a module of its own."""
+    """The drawings of a task with known dynamics. A further one has a subclass in its module."""
 
-    effort: ClassVar[str]  # the name of what an action exerts, such as the torque
-    unit: ClassVar[str]
-    largest_effort: ClassVar[float]
-    rightward: ClassVar[int]  # the sign of θ to the right, and of the effort that moves it there
     directions: ClassVar[tuple[str, str]]  # of a negative and of a positive effort
     return_digits: ClassVar[int]  # after the decimal point
     # The phase portrait: θ in rad over θ̇ in rad/s, with labels at these places.
@@ -31,15 +28,16 @@ class Scene(ABC):
     speeds: ClassVar[Sequence[float]]
 
     def __init__(self, task: Task) -> None:
-        self.task = task
+        self.task, self.dynamics = task, known_dynamics(task)
 
-    @abstractmethod
     def effort_of_action(self, action: Any) -> float:
-        """Returns the effort of an action of a policy."""
+        """Returns the effort of an action as the environment takes it."""
+        return float(self.dynamics.efforts(np.asarray([action]))[0])
 
-    @abstractmethod
     def state(self, observation: Observation) -> tuple[float, float]:
         """Returns θ in rad, 0 upright, and θ̇ in rad/s, with the signs of the environment."""
+        theta, speed = self.dynamics.states_of(observation[np.newaxis])[0, -2:]
+        return float(theta), float(speed)
 
     @abstractmethod
     def draw(

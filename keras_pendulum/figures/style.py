@@ -35,9 +35,9 @@ def own_style(font_size: float = 12) -> Iterator[None]:
         yield
 
 
-def torque_color(torque: float) -> str:
-    """Returns the colour of the direction of a torque."""
-    return CLOCKWISE if torque < 0 else COUNTERCLOCKWISE
+def torque_color(torque: float) -> tuple[int, int, int]:
+    """Returns the colour of the direction of a torque, as `rgb` does."""
+    return rgb(CLOCKWISE if torque < 0 else COUNTERCLOCKWISE)
 
 
 def rgb(color: str) -> tuple[int, int, int]:

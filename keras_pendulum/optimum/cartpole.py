@@ -15,7 +15,6 @@ from keras_pendulum.optimum.cartpole_dynamics import (
     FORCES,
     LARGEST_ANGLE,
     LARGEST_POSITION,
-    cartpole_starts,
     has_fallen,
     step_forces,
 )
@@ -50,10 +49,6 @@ class CartPoleSolution(KnownDynamics):
         "x/2.4, ẋ/3, θ/0.21, θ̇/3": (1 / LARGEST_POSITION, 1 / 3, 1 / LARGEST_ANGLE, 1 / 3),
     }
     least_random: ClassVar[float] = 0.3  # a good policy stays where all values are the same
-
-    def starts(self, seeds: Iterable[int]) -> Array:
-        """Returns the states [seeds, 4]."""
-        return cartpole_starts(seeds)
 
     def observe(self, states: Array) -> NDArray[np.float32]:
         """Returns the states, rounded to float32."""
@@ -105,7 +100,7 @@ class CartPoleSolution(KnownDynamics):
         self, discount: float, seeds: Iterable[int], steps: int | None = None
     ) -> Array:
         """Returns the steps until the policy falls that is optimal for a discount γ."""
-        table, states = self.table(discount), self.starts(seeds)
+        table, states = self.table(discount), self.task.starts(seeds)
         returns, standing = np.zeros(len(states)), np.ones(len(states), bool)
         for _ in range(steps or self.task.steps_per_episode):
             forces = self.greedy_efforts(table, discount, states)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.optimum.known_dynamics import Outcomes
 
 FORCE = 10.0  # N, of a push to the right
@@ -21,16 +19,6 @@ _POLE, _BOTH = 0.1, 1.1  # kg: the pole's mass, and that of cart and pole
 _HALF_LENGTH = 0.5  # m, of the pole
 
 States = NDArray[np.float64]  # [N, 4]: x in m, ẋ in m/s, θ in rad, θ̇ in rad/s
-
-
-def cartpole_starts(seeds: Iterable[int]) -> States:
-    """Returns the states [N, 4] of `reset(seed=…)` for N seeds."""
-    env = CartPole().make_env().unwrapped
-    states = []
-    for seed in seeds:
-        env.reset(seed=seed)
-        states.append(np.array(env.state, np.float64))  # type: ignore[attr-defined]
-    return np.array(states, np.float64).reshape(-1, 4)
 
 
 def step_forces(states: States, forces: NDArray[np.float64]) -> Outcomes:

@@ -34,7 +34,7 @@ from keras_pendulum.optimum.stored_results import (
     join_words,
     shipped_or_cached,
     split_words,
-    write_arrays_to_cache,
+    write_to_cache,
 )
 
 _log = logging.getLogger(__name__)
@@ -63,7 +63,7 @@ def cartpole_value(discount: float) -> Table:
         return found
     _log.warning("Computing the exact values of CartPole for γ = %g, once: about 10 s", discount)
     table = solve_cartpole(discount)
-    write_arrays_to_cache(cache_file(name), pack(table))
+    write_to_cache(cache_file(name), pack(table))
     return table
 
 

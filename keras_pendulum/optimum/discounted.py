@@ -1,4 +1,4 @@
-"""The optimum for a discount γ: its values and its Q-values.
+"""The optimal values of the pendulum for a discount γ.
 
 A DQN with γ < 1 learns the policy with the highest discounted sum of rewards. That policy need not
 attain the highest return of an episode, so a part of a regret comes from γ and not from learning.
@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE, Pendulum
-from keras_pendulum.optimum.dynamics import TORQUES, ByTorque, step_all_torques
 from keras_pendulum.optimum.stored_results import (
     Problem,
     are_between,
@@ -26,7 +25,7 @@ from keras_pendulum.optimum.stored_results import (
     read,
     write_to_cache,
 )
-from keras_pendulum.optimum.value_iteration import SPEED_STEP, solve, value_at, value_tables
+from keras_pendulum.optimum.value_iteration import SPEED_STEP, solve, value_tables
 
 _log = logging.getLogger(__name__)
 
@@ -52,7 +51,7 @@ def discounted_value(gravity: float, discount: float) -> NDArray[np.float32]:
         "Computing the exact values for g = %g and γ = %g, once: about 5 s", gravity, discount
     )
     table = solve_discounted(problem.gravity, problem.discount, CELLS)
-    write_to_cache(file, problem, value=table)
+    write_to_cache(file, {**problem._asdict(), "value": table})
     return table
 
 
@@ -65,25 +64,3 @@ def solve_discounted(gravity: float, discount: float, cells: int) -> NDArray[np.
         if np.abs(table - before).max() <= TOLERANCE:
             break
     return table
-
-
-def exact_q(
-    table: NDArray[np.float32],
-    gravity: float,
-    discount: float,
-    theta: NDArray[np.float64],
-    speed: NDArray[np.float64],
-    torques: NDArray[np.float64] = TORQUES,
-) -> ByTorque:
-    """Returns the Q-values [N, A] of the optimum: reward + γ V(next state).
-
-    Args:
-        table: V, from `discounted_value` for the same gravity and discount.
-        gravity: g in m/s².
-        discount: γ.
-        theta: [N] rad, any angle.
-        speed: [N] rad/s, -8 to 8.
-        torques: [A] N·m of the first step. All later ones are those of V: the best of 41.
-    """
-    rewards, next_theta, next_speed = step_all_torques(gravity, theta, speed, torques)
-    return rewards + discount * value_at(table, next_theta, next_speed)

@@ -23,7 +23,7 @@ from keras_pendulum.optimum.stored_results import (
     join_words,
     shipped_or_cached,
     split_words,
-    write_arrays_to_cache,
+    write_to_cache,
 )
 from keras_pendulum.optimum.value_iteration import solve
 
@@ -59,7 +59,7 @@ def episode_values(gravity: float) -> EpisodeValues:
         return found
     _log.warning("Computing the optimal values for g = %g, once: about 30 s", gravity)
     values = solve_episode(problem.gravity)
-    write_arrays_to_cache(cache_file(name), pack(values))
+    write_to_cache(cache_file(name), pack(values))
     return values
 
 

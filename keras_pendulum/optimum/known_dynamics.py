@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -26,7 +25,8 @@ class Outcomes(NamedTuple):
 class KnownDynamics(Solution):
     """The solution of a task whose dynamics are known.
 
-    A state has S numbers. The effort of an action is a torque in N·m, or a force in N.
+    A state has the S numbers of `Task.starts`. The effort of an action is a torque in N·m, or a
+    force in N.
     """
 
     effort: ClassVar[str]  # "torque" or "force"
@@ -39,10 +39,6 @@ class KnownDynamics(Solution):
     mirror: ClassVar[tuple[int, ...]]  # signs [D] of an observation whose effort is reversed
     other_units: ClassVar[dict[str, tuple[float, ...]]]  # factors [D], by what the observation is
     least_random: ClassVar[float]  # share of random actions at which a diagnosis looks
-
-    @abstractmethod
-    def starts(self, seeds: Iterable[int]) -> Array:
-        """Returns the states [seeds, S] of `reset(seed=…)`."""
 
     @abstractmethod
     def observe(self, states: Array) -> NDArray[np.float32]:

@@ -9,18 +9,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import (
-    MAX_SPEED,
-    STEPS_PER_EPISODE,
-    Pendulum,
-    pendulum_starts,
-)
+from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.environments.torque import MAX_TORQUE
-from keras_pendulum.optimum.discounted import discounted_value, exact_q
-from keras_pendulum.optimum.dynamics import TORQUES, step_all_torques
+from keras_pendulum.optimum.discounted import discounted_value
+from keras_pendulum.optimum.dynamics import TORQUES, simulate_return, step_all_torques
 from keras_pendulum.optimum.known_dynamics import KnownDynamics, Outcomes, Table
 from keras_pendulum.optimum.pendulum_returns import discounted_return
 from keras_pendulum.optimum.solution import RANDOM_EPISODES, Array
+from keras_pendulum.optimum.value_iteration import value_at
 
 
 class PendulumSolution(KnownDynamics):
@@ -44,10 +40,6 @@ class PendulumSolution(KnownDynamics):
         "cos θ, sin θ, θ̇/8": (1, 1, 1 / MAX_SPEED),
     }
     least_random: ClassVar[float] = 0.1
-
-    def starts(self, seeds: Iterable[int]) -> Array:
-        """Returns the states [seeds, 2]."""
-        return pendulum_starts(seeds)
 
     def observe(self, states: Array) -> NDArray[np.float32]:
         """Returns the observations [N, 3] of states [N, 2]."""
@@ -80,9 +72,13 @@ class PendulumSolution(KnownDynamics):
         return discounted_value(self.task.gravity, discount)
 
     def exact_q(self, table: Table, discount: float, states: Array, efforts: Array) -> Array:
-        """Returns the Q-values [N, A]."""
+        """Returns the Q-values [N, A]: reward + γ V(next state).
+
+        The torques of all later steps are those of V: the best of 41.
+        """
         theta, speed = states.T
-        return exact_q(table, self.task.gravity, discount, theta, speed, efforts)
+        reward, theta, speed = step_all_torques(self.task.gravity, theta, speed, efforts)
+        return reward + discount * value_at(table, theta, speed)
 
     def greedy_efforts(self, table: Table, discount: float, states: Array) -> Array:
         """Returns the torques [N] in N·m, of the 41."""
@@ -113,13 +109,11 @@ class PendulumSolution(KnownDynamics):
 
     def random_return(self, steps: int | None = None) -> float:
         """Returns the mean return of uniformly random torques."""
-        from keras_pendulum.optimum.dynamics import simulate_return
-
         # Simulating all episodes in one array is 20 times as fast as a loop.
         steps = steps or STEPS_PER_EPISODE
         shape = RANDOM_EPISODES, steps
         torques = np.random.RandomState(0).randint(len(TORQUES), size=shape)
-        starts = pendulum_starts(range(RANDOM_EPISODES))
+        starts = self.task.starts(range(RANDOM_EPISODES))
         returns = simulate_return(
             lambda step, *_: torques[:, step], steps, self.task.gravity, starts
         )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.fields import Integer
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, pendulum_starts
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.optimum.solution import USUAL_SEEDS
 from keras_pendulum.optimum.stored_results import (
     Problem,
@@ -57,8 +57,8 @@ def discounted_return(
         from keras_pendulum.optimum.best_return import compute_returns  # rarely needed
 
         missing = sorted({*seeds, *USUAL_SEEDS} - returns.keys())
-        computed = compute_returns(problem, pendulum_starts(missing))
+        computed = compute_returns(problem, Pendulum().starts(missing))
         returns |= zip(missing, computed.tolist(), strict=True)
-        values = np.array(list(returns.values()))
-        write_to_cache(cache, problem, seeds=np.array(list(returns)), returns=values)
+        arrays = {"seeds": np.array(list(returns)), "returns": np.array(list(returns.values()))}
+        write_to_cache(cache, problem._asdict() | arrays)
     return np.array([returns[seed] for seed in seeds], np.float64)

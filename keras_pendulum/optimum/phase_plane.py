@@ -14,11 +14,8 @@ from numpy.typing import NDArray
 
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
-from keras_pendulum.optimum.discounted import exact_q
-from keras_pendulum.optimum.dynamics import TORQUES
-from keras_pendulum.optimum.known_dynamics import KnownDynamics
-from keras_pendulum.optimum.solution import Array
-from keras_pendulum.optimum.solutions import solution
+from keras_pendulum.optimum.known_dynamics import KnownDynamics, Table
+from keras_pendulum.optimum.solutions import known_dynamics, solution
 from keras_pendulum.optimum.value_iteration import solve
 
 if TYPE_CHECKING:
@@ -57,7 +54,7 @@ def run_phase_planes(network: DQN, config: Config) -> dict[str, PhasePlane]:
 
 def network_phase_plane(network: DQN, task: Task, reward_scale: float = 1.0) -> PhasePlane:
     """Returns the greedy efforts of a Q-network, and its values divided by the `reward_scale`."""
-    dynamics, policy = _known(task), greedy_policy(network)
+    dynamics, policy = known_dynamics(task), greedy_policy(network)
     efforts = dynamics.all_efforts(task.actions(network.action_count))
     # One row at a time, which needs little memory.
     q = np.array([policy.q_values(dynamics.observe(row)) for row in _rows(dynamics)])
@@ -69,38 +66,31 @@ def optimal_phase_plane(task: Task, discount: float) -> PhasePlane:
 
     The policy for a discount below 1 need not attain the highest return.
     """
-    dynamics = _known(task)
+    dynamics = known_dynamics(task)
+    efforts, rows = dynamics.all_efforts(task.actions()), _rows(dynamics)
     if isinstance(task, Pendulum):
-        q, efforts = _pendulum_q(task, dynamics, discount), TORQUES
-        return PhasePlane(efforts[q.argmax(axis=2)], q.max(axis=2), dynamics)
-    efforts, table = dynamics.all_efforts(task.actions()), dynamics.table(discount)
-    rows = _rows(dynamics)
+        table = _coarse_table(task, discount)
+    else:
+        table = dynamics.table(discount)
     q = np.array([dynamics.exact_q(table, discount, row, efforts) for row in rows])
     survives = np.array([dynamics.survives(row) for row in rows])
     return PhasePlane(np.where(survives, efforts[q.argmax(axis=2)], 0.0), q.max(axis=2), dynamics)
 
 
-def _pendulum_q(task: Pendulum, dynamics: KnownDynamics, discount: float) -> Array:
-    """Returns the Q-values [POINTS, POINTS, A] from a coarse table, which takes little time.
+def _coarse_table(task: Pendulum, discount: float) -> Table:
+    """Returns a coarse table of V, which takes little time.
 
     It counts the steps whose discount factor is above 0.001, at most an episode.
     """
     horizon = STEPS_PER_EPISODE
     if 0 < discount < 1:
         horizon = min(horizon, math.ceil(math.log(1e-3) / math.log(discount)))
-    table = solve(task.gravity, horizon, _THETA_CELLS, discount)
-    return np.array([exact_q(table, task.gravity, discount, *row.T) for row in _rows(dynamics)])
-
-
-def _known(task: Task) -> KnownDynamics:
-    dynamics = solution(task)
-    assert isinstance(dynamics, KnownDynamics)
-    return dynamics
+    return solve(task.gravity, horizon, _THETA_CELLS, discount)
 
 
 def _rows(dynamics: KnownDynamics) -> NDArray[np.float64]:
     """Returns the states [POINTS, POINTS, S]. θ and θ̇ are the last two numbers; others are 0."""
     angles, speeds = (np.linspace(-end, end, POINTS) for end in dynamics.phase_ends)
-    states = np.zeros((POINTS, POINTS, len(dynamics.starts(range(1))[0])))
+    states = np.zeros((POINTS, POINTS, len(dynamics.task.starts(range(1))[0])))
     states[..., -2], states[..., -1] = angles, speeds[:, None]
     return states

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import declared_task
 from keras_pendulum.optimum.cartpole import CartPoleSolution
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
 from keras_pendulum.optimum.pendulum import PendulumSolution
 from keras_pendulum.optimum.solution import Solution
 
@@ -23,6 +24,13 @@ SOLUTIONS: dict[str, Any] = {  # classes that take the task
 def solution(task: Task) -> Solution:
     """Returns the solution of a task."""
     found: Solution = SOLUTIONS[task.environment](task)
+    return found
+
+
+def known_dynamics(task: Task) -> KnownDynamics:
+    """Returns the solution of a task whose dynamics are known."""
+    found = solution(task)
+    assert isinstance(found, KnownDynamics)
     return found
 
 

@@ -70,7 +70,7 @@ def are_between(lowest: float, values: NDArray[Any]) -> bool:
 
 
 def read(path: Path | None, problem: Problem, *names: str) -> list[NDArray[Any]]:
-    """Returns the arrays of these names in a file.
+    """Returns the arrays of these names in a file that also has the fields of its problem.
 
     The result is empty when the file is missing, damaged, or of another problem.
     """
@@ -91,11 +91,6 @@ def read_arrays(path: Path | None) -> dict[str, NDArray[Any]]:
             return dict(file)
     except Exception:  # one flipped bit of an archive can raise any of seven exception types
         return {}
-
-
-def write(path: Path, problem: Problem, **arrays: NDArray[Any]) -> None:
-    """Writes a file that `read` reads. Raises UserError when it cannot be written."""
-    write_arrays(path, {**problem._asdict(), **arrays})
 
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
@@ -132,13 +127,8 @@ def shipped_or_cached(
     return None
 
 
-def write_to_cache(path: Path | None, problem: Problem, **arrays: NDArray[Any]) -> None:
-    """Writes a file of the cache for `read`, if it can be written: it only saves time."""
-    write_arrays_to_cache(path, {**problem._asdict(), **arrays})
-
-
-def write_arrays_to_cache(path: Path | None, arrays: dict[str, Any]) -> None:
-    """Writes a file of the cache for `read_arrays`, if it can be written."""
+def write_to_cache(path: Path | None, arrays: dict[str, Any]) -> None:
+    """Writes a file of the cache for `read_arrays`, if it can be written: it only saves time."""
     if path is not None:
         with contextlib.suppress(OSError, UserError):
             path.parent.mkdir(parents=True, exist_ok=True)

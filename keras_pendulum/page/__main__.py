@@ -82,8 +82,7 @@ def _write(arguments: argparse.Namespace) -> int:
     with fast_import():
         from keras_pendulum.evaluate.evaluation import find_task
         from keras_pendulum.evaluate.sources import load_policy
-        from keras_pendulum.page.build import build_page
-        from keras_pendulum.page.task_content import FOLDERS
+        from keras_pendulum.page.build import FOLDERS, build_page
         from keras_pendulum.page.training import training_content
         from keras_pendulum.storage.find_weights import find_weights
         from keras_pendulum.storage.load_weights import load_weights

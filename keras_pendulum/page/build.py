@@ -3,7 +3,8 @@
 The scripts and the texts of a task are in a folder of their own in `web/`.
 
 The weights are base85 of float32, so the page needs no server and no network connection. The comma
-replaces the character <, which a script cannot contain.
+replaces the character <, which a script cannot contain. The optimal values are 16-bit numbers:
+their differences, compressed, in base64.
 """
 
 from __future__ import annotations
@@ -11,21 +12,30 @@ from __future__ import annotations
 import base64
 import json
 import re
+import zlib
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from keras_pendulum.dqn.network import DQN
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.q_policies import DQNPolicy
 from keras_pendulum.figures.curves import PRESET_STYLES, curve_style
+from keras_pendulum.optimum.cartpole_values import cartpole_value
+from keras_pendulum.optimum.episode_values import LARGEST, differences, episode_values
+from keras_pendulum.optimum.stored_results import split_words
 from keras_pendulum.page.learning import learning_content
-from keras_pendulum.page.task_content import FOLDERS, optimum_content
 from keras_pendulum.storage.load_weights import recorded_return
 from keras_pendulum.storage.run_info import RunInfo
 from keras_pendulum.version import __version__
 
+FOLDERS = {"Pendulum-v1": "pendulum", "CartPole-v1": "cartpole"}  # in web/
+_CARTPOLE_DISCOUNT = 0.99
 _WEB = resources.files("keras_pendulum.page") / "web"
 
 
@@ -56,7 +66,7 @@ def build_page(
         "version": __version__,
         "against": None,
         "training": training,
-        "optimum": optimum_content(task),
+        "optimum": _optimum_content(task),
         "learning": learning_content(task),
     }
     if name is not None:
@@ -87,6 +97,24 @@ def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
         "rewardScale": info.reward_scale,
         "weights": base64.b85encode(weights).decode().replace("<", ","),
     }
+
+
+def _optimum_content(task: Task) -> dict[str, Any]:
+    """Returns the table of the optimal values that the scripts of the task read."""
+    if isinstance(task, Pendulum):
+        values = episode_values(task.gravity)
+        rows, columns = values.roots.shape
+        return {"rows": rows, "columns": columns, "scale": values.scale, **_table(values.roots)}
+    # The optimal value at the first half of the grid points, in shares of the highest one.
+    shares = cartpole_value(_CARTPOLE_DISCOUNT) * (1 - _CARTPOLE_DISCOUNT)
+    return {"discount": _CARTPOLE_DISCOUNT, **_table(np.rint(shares * LARGEST).astype(np.uint16))}
+
+
+def _table(words: NDArray[np.uint16]) -> dict[str, str]:
+    """Returns the compressed numbers as `start.js` reads them."""
+    parts = split_words(differences(words))
+    compressed = zlib.compress(b"".join(each.tobytes() for each in parts.values()), 9)
+    return {"table": base64.b64encode(compressed).decode()}
 
 
 def _fill(content: dict[str, Any], folder: str, lesson: bool) -> str:

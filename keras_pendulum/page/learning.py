@@ -9,7 +9,7 @@ from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import preset
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
-from keras_pendulum.optimum.solutions import SOLUTIONS, solution
+from keras_pendulum.optimum.solutions import solution
 from keras_pendulum.train.evaluations import SEEDS
 
 _SMALL = (64, 64)  # hidden units; a run of `reference` takes about 16 s in a browser
@@ -150,7 +150,7 @@ def learning_content(task: Task) -> dict[str, Any]:
     return {
         "settings": {**healthy, **OWN_SETTINGS},
         "action_count": task.action_count(config.torque_count),
-        "starts": SOLUTIONS[task.environment](task).starts(SEEDS).tolist(),
+        "starts": task.starts(SEEDS).tolist(),
         "highest_return": highest_return(task),
         "switches": switches,
         "networks": _OTHER_SIZES,

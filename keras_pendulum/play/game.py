@@ -1,20 +1,18 @@
 """The game: the player drives, then a policy drives from the same start.
 
 A `Game` has no window and no clock. Its caller passes it the pressed keys, calls `advance` once per
-frame, and draws its `view`.
+frame, and draws it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import Enum, auto
 
 from keras_pendulum.evaluate.policy import Policy
-from keras_pendulum.figures.moment import Moment
+from keras_pendulum.figures.moment import ShownEpisode, States
 from keras_pendulum.optimum.solution import USUAL_SEEDS
 from keras_pendulum.optimum.solutions import solution
-from keras_pendulum.play.episode import ManualEpisode
 from keras_pendulum.play.played_task import PlayedTask
 
 FRAMES_PER_SECOND = 20  # each is a step: of 0.05 s for the pendulum
@@ -33,19 +31,6 @@ class Key(Enum):
     RESTART = auto()
     CONTINUE = auto()
     LEAVE = auto()
-
-
-@dataclass(frozen=True)
-class View:
-    """The content of one frame."""
-
-    title: str
-    task: PlayedTask
-    held: bool  # whether a key acts only while it is held
-    seed: int
-    moment: Moment
-    message: str  # over the picture; empty while an episode runs
-    key_help: str
 
 
 class _Stage(Enum):
@@ -83,6 +68,13 @@ class Game:
         policy: drives after the player, if there is one.
         print_line: called with each line of output.
         print_steps: print a line for each step of the player.
+
+    Attributes:
+        task: as the game plays it.
+        seed: of the present start.
+        episode: on the screen.
+        held: whether a key acts only while it is held.
+        finished: whether the player has left.
     """
 
     def __init__(
@@ -94,13 +86,13 @@ class Game:
         print_line: Callable[[str], None] = print,
         print_steps: bool = False,
     ) -> None:
-        self._task, self._policy, self._print_line = task, policy, print_line
+        self.task, self._policy, self._print_line = task, policy, print_line
         self._print_steps = print_steps
-        right = task.scene.rightward
+        right = task.scene.dynamics.rightward
         self._directions = {Key.NEGATIVE: -1, Key.POSITIVE: 1, Key.NEUTRAL: 0}
         self._directions |= {Key.LEFT: -right, Key.RIGHT: right}
         self._env = task.task.make_env()
-        self.finished = self._held = False
+        self.finished = self.held = False
         self._stage = _Stage.READY
         self._start(seed)
 
@@ -112,7 +104,7 @@ class Game:
         elif key is Key.RESTART:
             self._restart()
         elif key is Key.HOLD:
-            self._held = not self._held
+            self.held = not self.held
             self._direction = 0
         elif key in self._directions and stage in (_Stage.READY, _Stage.PLAYER):
             self._direction = self._directions[key]
@@ -124,11 +116,11 @@ class Game:
                 self._step_agent()
         elif key is Key.CONTINUE and stage is _Stage.SCORE:
             # Stays within the seeds whose optimal returns are stored together.
-            self._start((self._seed + 1) % len(USUAL_SEEDS))
+            self._start((self.seed + 1) % len(USUAL_SEEDS))
 
     def release(self, key: Key) -> None:
         """Ends the effort of a key that is released, where keys act only while they are held."""
-        if self._held and self._directions.get(key) == self._direction:
+        if self.held and self._directions.get(key) == self._direction:
             self._direction = 0
 
     def advance(self) -> None:
@@ -142,67 +134,67 @@ class Game:
         elif self._stage is _Stage.AGENT:
             self._step_agent()
 
-    def view(self) -> View:
-        """Returns the content of the present frame."""
-        message = {_Stage.READY: "Get ready!", _Stage.SCORE: self._score()}.get(self._stage, "")
-        episode = self._episode
-        return View(
-            title=_TITLES[self._stage],
-            task=self._task,
-            held=self._held,
-            seed=self._seed,
-            moment=Moment(
-                observation=episode.observation,
-                effort=episode.effort,
-                step=episode.steps,
-                steps=self._task.task.steps_per_episode,
-                reward=episode.reward,
-                total_reward=episode.total_reward,
-                optimal_return=self._optimal_return,
-                path=episode.path,
-                earlier_path=() if episode is self._player else self._player.path,
-            ),
-            message=message,
-            key_help=_KEY_HELP[self._stage],
-        )
+    @property
+    def title(self) -> str:
+        """Who drives."""
+        return _TITLES[self._stage]
+
+    @property
+    def message(self) -> str:
+        """The text over the picture; empty while an episode runs."""
+        return {_Stage.READY: "Get ready!", _Stage.SCORE: self._score()}.get(self._stage, "")
+
+    @property
+    def key_help(self) -> str:
+        """The keys of the present stage."""
+        return _KEY_HELP[self._stage]
+
+    @property
+    def earlier_path(self) -> States:
+        """The path of the player while the agent drives."""
+        return () if self.episode is self._player else self._player.path
 
     def close(self) -> None:
         """Closes the environment."""
         self._env.close()
 
     def _start(self, seed: int) -> None:
-        self._seed = seed
-        self._optimal_return = float(solution(self._task.task).best_returns([seed])[0])
-        self._print_line(f"Start: seed {seed}, {self._task.task.name}")
+        self.seed = seed
+        self._optimal_return = float(solution(self.task.task).best_returns([seed])[0])
+        self._print_line(f"Start: seed {seed}, {self.task.task.name}")
         self._restart()
 
     def _restart(self) -> None:
         # The episode on the screen is the player's until the agent drives.
-        self._player = self._episode = self._new_episode()
+        self._player = self.episode = self._new_episode()
         self._direction = 0
         self._stage = _Stage.READY
         self._frames_left = READY_FRAMES
 
-    def _new_episode(self) -> ManualEpisode:
-        return ManualEpisode(self._task, self._env, self._seed)
+    def _new_episode(self) -> ShownEpisode:
+        observation, _ = self._env.reset(seed=self.seed)
+        return ShownEpisode(self.task.scene, self._env, observation, self._optimal_return)
 
     def _step_player(self) -> None:
-        self._player.step(self._task.effort_of(self._direction, self._player.steps))
+        player, scene = self._player, self.task.scene
+        player.step(self.task.action(self._direction, player.steps))
         if self._print_steps:
-            self._print_line(str(self._player))
-        if self._player.done:
+            self._print_line(
+                f"Step: {player.steps}, {scene.dynamics.effort.capitalize()}: {player.effort:g}, "
+                f"Reward: {player.reward:.3f}, Return: {player.total_reward:.3f}"
+            )
+        if player.done:
             if self._policy is None:
                 self._show_score()
             else:
                 self._policy.reset()
-                self._episode = self._new_episode()
+                self.episode = self._new_episode()
                 self._stage = _Stage.AGENT
 
     def _step_agent(self) -> None:
         assert self._policy is not None
-        action = self._policy.action(self._episode.observation)
-        self._episode.step(self._task.scene.effort_of_action(action))
-        if self._episode.done:
+        self.episode.step(self._policy.action(self.episode.observation))
+        if self.episode.done:
             self._show_score()
 
     def _show_score(self) -> None:
@@ -216,12 +208,12 @@ class Game:
 
     def _score(self) -> str:
         """Returns the returns of the finished episodes, or the player's return so far."""
-        show = self._task.scene.show_return
+        show = self.task.scene.show_return
         player = f"you {show(self._player.total_reward)}"
         if not self._player.done:
-            steps = self._task.task.steps_per_episode
+            steps = self.task.task.steps_per_episode
             return f"{player} after {self._player.steps} of {steps} steps"
         parts = [player]
-        if self._episode is not self._player and self._episode.done:
-            parts.append(f"agent {show(self._episode.total_reward)}")
+        if self.episode is not self._player and self.episode.done:
+            parts.append(f"agent {show(self.episode.total_reward)}")
         return " · ".join([*parts, f"best possible {show(self._optimal_return)}"])

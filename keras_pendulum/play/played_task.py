@@ -9,9 +9,8 @@ import numpy as np
 
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
-from keras_pendulum.environments.torque import MAX_TORQUE, require_torque
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.figures.scenes import scene
-from keras_pendulum.optimum.cartpole_dynamics import FORCE
 
 
 class PlayedTask(ABC):
@@ -28,17 +27,13 @@ class PlayedTask(ABC):
         """The line of the window on the physics or on the clock."""
 
     @abstractmethod
-    def effort_of(self, direction: int, step: int) -> float:
-        """Returns the effort of a key, in a step of the episode.
+    def action(self, direction: int, step: int) -> Any:
+        """Returns the action of a key, as the environment takes it.
 
         Args:
-            direction: -1, 0 or 1.
-            step: 0 is the first one.
+            direction: of the effort: -1, 0 or 1.
+            step: of the episode; 0 is the first one.
         """
-
-    @abstractmethod
-    def action(self, effort: float) -> Any:
-        """Returns the action of the environment. Raises ValueError for an impossible effort."""
 
 
 class PlayedPendulum(PlayedTask):
@@ -52,15 +47,9 @@ class PlayedPendulum(PlayedTask):
         """The gravity."""
         return f"g = {self.task.gravity:g} m/s²"
 
-    def effort_of(self, direction: int, step: int) -> float:
-        """Returns the torque in N·m."""
-        return MAX_TORQUE * direction
-
-    def action(self, effort: float) -> Any:
-        """Returns the torque as an array [1]. Raises ValueError for one outside of ±2 N·m."""
-        # The environment would clip a larger torque, and its state would stay NaN after a NaN.
-        require_torque(effort)
-        return np.array([effort])
+    def action(self, direction: int, step: int) -> Any:
+        """Returns the torque [1] in N·m."""
+        return np.array([MAX_TORQUE * direction])
 
 
 class PlayedCartPole(PlayedTask):
@@ -78,15 +67,9 @@ class PlayedCartPole(PlayedTask):
         """The speed of the game: a hand is too slow for the real one."""
         return "slow motion, 20 steps a second"
 
-    def effort_of(self, direction: int, step: int) -> float:
-        """Returns the force in N, to the right."""
-        return FORCE * (direction or (1 if step % 2 else -1))
-
-    def action(self, effort: float) -> int:
-        """Returns 0 or 1. Raises ValueError for another force than ±10 N."""
-        if abs(effort) != FORCE:
-            raise ValueError(f"force is {effort!r}; expected -{FORCE:g} or {FORCE:g} (N)")
-        return int(effort > 0)
+    def action(self, direction: int, step: int) -> int:
+        """Returns 0 or 1."""
+        return int(direction > 0) if direction else step % 2
 
 
 PLAYED_TASKS: dict[str, Any] = {  # by environment; classes that take the task

@@ -1,4 +1,4 @@
-"""The window of the game: it reads keys and draws views."""
+"""The window of the game: it reads keys and draws frames."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pygame
 from keras_pendulum.errors import UserError
 from keras_pendulum.figures.drawing import LARGE, PAPER, Writer
 from keras_pendulum.figures.moment import BELOW, draw_moment
-from keras_pendulum.play.game import FRAMES_PER_SECOND, Game, Key, View
+from keras_pendulum.play.game import FRAMES_PER_SECOND, Game, Key
 
 KEYS = {
     pygame.K_j: Key.NEGATIVE,
@@ -53,7 +53,8 @@ class Window:
             raise UserError(f"cannot open a window: {error}") from error
         pygame.display.set_caption("keras_pendulum: play")
         pygame.key.stop_text_input()  # an input method would take the letters
-        self._write = Writer(self._screen).write
+        self._writer = Writer(self._screen)
+        self._write = self._writer.write
 
     def key_events(self) -> list[tuple[Key, bool]]:
         """Returns the keys since the last call, and whether they were pressed or released.
@@ -79,19 +80,19 @@ class Window:
         """Closes the window."""
         pygame.display.quit()
 
-    def show(self, view: View) -> None:
-        """Draws a view and waits until the next frame is due."""
+    def show(self, game: Game) -> None:
+        """Draws a frame of the game and waits until the next one is due."""
         self._screen.fill(PAPER)
-        self._write(view.title, (16, 13), LARGE)
-        acts = "while it is held" if view.held else "until the next one"
+        self._write(game.title, (16, 13), LARGE)
+        acts = "while it is held" if game.held else "until the next one"
         self._write(f"a key acts {acts} (h: switch)", (_WIDTH // 2 - 90, 16), align=0.5)
-        start = f"{view.task.setting}      start of seed {view.seed}"
+        start = f"{game.task.setting}      start of seed {game.seed}"
         self._write(start, (_WIDTH - 16, 16), align=1.0)
-        draw_moment(self._screen, self._write, _MOMENT, view.task.scene, view.moment)
-        if view.message:
-            self._write(view.message, (_WIDTH // 4, _TOP + 6), align=0.5)
-        self._write(view.task.keys, (16, _HEIGHT - 30))
-        self._write(view.key_help, (_WIDTH - 16, _HEIGHT - 30), align=1.0)
+        draw_moment(self._writer, _MOMENT, game.episode, game.earlier_path)
+        if game.message:
+            self._write(game.message, (_WIDTH // 4, _TOP + 6), align=0.5)
+        self._write(game.task.keys, (16, _HEIGHT - 30))
+        self._write(game.key_help, (_WIDTH - 16, _HEIGHT - 30), align=1.0)
         pygame.display.flip()
         self._wait_for_frame()
 
@@ -108,4 +109,4 @@ def play(game: Game, window: Window, check_interrupt: Callable[[], None]) -> Non
             if game.finished:
                 return
         game.advance()
-        window.show(game.view())
+        window.show(game)

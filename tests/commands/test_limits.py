@@ -20,7 +20,7 @@ GREATEST_SEED = 4_294_967_295
 # The first thing that each command does after it has checked its arguments.
 FIRST_WORK = {
     evaluate: "keras_pendulum.environments.task.Task.make_env",
-    page: "keras_pendulum.page.task_content.episode_values",
+    page: "keras_pendulum.page.build.episode_values",
     play: "keras_pendulum.play.__main__.require_display",
     study: "keras_pendulum.study.__main__.require_tensorflow",
 }

@@ -15,7 +15,7 @@ from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.environments.actions import TorqueGrid
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.evaluate.policy import Policy
-from keras_pendulum.optimum.discounted import exact_q, solve_discounted
+from keras_pendulum.optimum.discounted import solve_discounted
 from keras_pendulum.optimum.dynamics import TORQUES
 from keras_pendulum.optimum.pendulum import PendulumSolution
 
@@ -35,7 +35,8 @@ def exact_values(
     theta = np.arctan2(observations[:, 1], observations[:, 0]).astype(np.float64)
     speed = np.clip(observations[:, 2].astype(np.float64), -8, 8)
     table = coarse_value(gravity, discount or 0.9)  # of no effect for 0
-    return exact_q(table, gravity, discount, theta, speed)
+    states = np.stack([theta, speed], axis=1)
+    return PendulumSolution(Pendulum(gravity)).exact_q(table, discount, states, TORQUES)
 
 
 class ExactPolicy(Policy):

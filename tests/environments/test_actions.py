@@ -15,7 +15,6 @@ from keras_pendulum.environments.actions import (
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
-from keras_pendulum.environments.torque import require_torque
 from keras_pendulum.errors import ConfigError
 
 
@@ -23,31 +22,6 @@ def test_grid_is_the_linspace_of_the_original() -> None:
     grid = TorqueGrid(41)
     np.testing.assert_array_equal(grid.torques, np.linspace(-2, 2, 41))
     assert grid.count == 41
-
-
-@pytest.mark.parametrize("count", [2, 3, 41, 101])
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_nearest_index_of_each_torque_is_its_index(count: int, dtype: type[np.floating]) -> None:
-    grid = TorqueGrid(count)
-    found = [
-        grid.nearest_index(float(dtype(grid.to_env_action(index)[0]))) for index in range(count)
-    ]
-    assert found == list(range(count))
-
-
-def test_torque_between_two_of_the_grid_gets_the_nearer_index() -> None:
-    grid = TorqueGrid(41)
-    assert grid.nearest_index(-1.96) == 0
-    assert grid.nearest_index(-1.94) == 1
-
-
-@pytest.mark.parametrize("torque", [float("nan"), float("inf"), -2.001, 2.001, 2 + 2**-51])
-def test_torque_out_of_range_is_refused(torque: float) -> None:
-    for require in (TorqueGrid(41).nearest_index, require_torque):
-        with pytest.raises(ValueError, match=f"torque {torque} N·m; expected a number from -2 to"):
-            require(torque)
-        for limit in (-2.0, 2.0):
-            require(limit)
 
 
 def test_environment_gets_a_float64_torque_of_shape_1() -> None:

@@ -10,7 +10,7 @@ import pytest
 from gymnasium.wrappers import PassiveEnvChecker
 
 from keras_pendulum.environments.cartpole import CartPole
-from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum, pendulum_starts
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import TASKS, make_task
 from keras_pendulum.errors import ConfigError
@@ -92,7 +92,7 @@ def test_environment_has_no_checker(task: Task) -> None:
 
 
 def test_pendulum_starts_are_the_states_after_reset() -> None:
-    starts = pendulum_starts([5, 0, 5])
+    starts = Pendulum().starts([5, 0, 5])
     assert starts.shape == (3, 2)
     assert starts.dtype == np.float64
     for (angle, speed), seed in zip(starts, [5, 0, 5], strict=True):
@@ -100,7 +100,3 @@ def test_pendulum_starts_are_the_states_after_reset() -> None:
         np.testing.assert_allclose(observation, [np.cos(angle), np.sin(angle), speed], rtol=1e-6)
     assert (starts[0] == starts[2]).all()
     assert (starts[0] != starts[1]).all()
-
-
-def test_pendulum_starts_of_no_seeds_are_empty() -> None:
-    assert pendulum_starts([]).shape == (0, 2)

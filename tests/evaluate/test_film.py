@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
+import copy
 import io
 import math
 import shutil
@@ -25,7 +25,7 @@ from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.evaluate import film, film_command
 from keras_pendulum.evaluate.film import SIZE, draw_frame
 from keras_pendulum.figures.drawing import Writer
-from keras_pendulum.figures.moment import Moment
+from keras_pendulum.figures.moment import ShownEpisode
 from keras_pendulum.figures.scenes import SCENES, scene
 from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
 
@@ -82,16 +82,15 @@ def test_optimum_of_a_film_is_that_of_its_seed_or_angle(monkeypatch: pytest.Monk
 def test_film_shows_each_step_with_the_return_of_the_evaluation(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    moments: list[Moment] = []
-
+    moments: list[ShownEpisode] = []
+    lengths: list[int] = []
     titles: list[tuple[str, str]] = []
 
-    def record(
-        writer: Any, drawn: Any, titles_of_frame: tuple[str, str], moment: Moment
-    ) -> Image.Image:
-        moments.append(dataclasses.replace(moment, path=list(moment.path)))
+    def record(writer: Any, titles_of_frame: tuple[str, str], episode: ShownEpisode) -> Image.Image:
+        moments.append(copy.copy(episode))
+        lengths.append(len(episode.path))
         titles.append(titles_of_frame)
-        return Image.new("RGB", (2, 2), (moment.step, 0, 0))
+        return Image.new("RGB", (2, 2), (episode.steps, 0, 0))
 
     monkeypatch.setattr(film, "draw_frame", record)
     policy = kp.load_policy("reference")
@@ -105,13 +104,13 @@ def test_film_shows_each_step_with_the_return_of_the_evaluation(
     arguments = argparse.Namespace(gif=tmp_path / "film.gif", video=None, start=None, seed=5)
     film_command.make_films(arguments, policy, Pendulum(), "mine")
     score = kp.evaluate_policy(policy, 1, seed=5)
-    assert [moment.step for moment in moments] == list(range(201))
+    assert [moment.steps for moment in moments] == list(range(201))
     assert set(titles) == {("mine, g = 1 m/s²", "start of seed 5")}
     assert moments[-1].total_reward == pytest.approx(score.mean_return)
     assert moments[-1].optimal_return == score.optimal_mean_return
     first = policy(np.asarray(Pendulum().make_env().reset(seed=5)[0]))
     assert [moment.effort for moment in moments[:2]] == [0, first[0]]
-    assert [len(moment.path) for moment in moments] == list(range(1, 202))
+    assert lengths == list(range(1, 202))
     # A GIF shows each second step, and the last one.
     assert shown == list(range(0, 201, 2))
 
@@ -132,11 +131,10 @@ def test_film_names_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def frame(task: Task, observation: Any, effort: float, titles: Any = TITLES, **numbers: Any) -> Any:
-    drawn = scene(task)
-    given: dict[str, Any] = {"step": 7, "steps": 200, "reward": -1.0, "total_reward": -276.5}
-    given |= {"optimal_return": -295.6, "path": [drawn.state(observation)]} | numbers
-    moment = Moment(observation=observation, effort=effort, **given)
-    return draw_frame(Writer(pygame.Surface(SIZE)), drawn, titles, moment)
+    env: Any = None  # no step is taken
+    episode = ShownEpisode(scene(task), env, observation, -295.6, effort, 7, -1.0, -276.5)
+    vars(episode).update(numbers)
+    return draw_frame(Writer(pygame.Surface(SIZE)), titles, episode)
 
 
 def test_every_task_can_be_filmed() -> None:
@@ -188,7 +186,7 @@ def test_edges_of_the_drawing_are_smooth() -> None:
     ("task", "state", "numbers"),
     [
         (Pendulum(100.0), HANGING, {"total_reward": -3255.1, "optimal_return": -1758.3}),
-        (CartPole(), CART, {"steps": 500, "total_reward": 500.0, "optimal_return": 500.0}),
+        (CartPole(), CART, {"total_reward": 500.0, "optimal_return": 500.0}),
     ],
     ids=["pendulum", "cartpole"],
 )
@@ -196,9 +194,9 @@ def test_texts_of_a_frame_do_not_overlap_and_are_inside(
     task: Task, state: Any, numbers: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     boxes = record_texts(monkeypatch)
-    effort = -scene(task).largest_effort
+    effort = -scene(task).dynamics.largest_effort
     titles = ("a_longer_name_of_a_file, g = 100 m/s²", "start of seed 4294967295")
-    frame(task, state, effort, titles=titles, step=200, reward=-16.274, **numbers)
+    frame(task, state, effort, titles=titles, steps=200, reward=-16.274, **numbers)
     assert len(boxes) == 23
     require_legible_texts(boxes, SIZE)
 

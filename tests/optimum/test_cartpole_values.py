@@ -14,7 +14,7 @@ import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.optimum import cartpole_values
 from keras_pendulum.optimum.cartpole import CartPoleSolution
-from keras_pendulum.optimum.cartpole_dynamics import FORCES, cartpole_starts, step_forces
+from keras_pendulum.optimum.cartpole_dynamics import FORCES, step_forces
 from keras_pendulum.optimum.cartpole_values import (
     cartpole_q,
     cartpole_value,
@@ -33,7 +33,7 @@ EXACT = CartPoleSolution(CartPole())
 def visited(seed: int = 0, episodes: int = 40) -> NDArray[np.float64]:
     """Returns states of episodes in which half of the actions are those of the optimum."""
     random, table = np.random.RandomState(seed), cartpole_value(0.99)
-    states = cartpole_starts(range(episodes))
+    states = CartPole().starts(range(episodes))
     found = []
     for _ in range(100):
         forces = FORCES[random.randint(2, size=len(states))]
@@ -50,7 +50,7 @@ def test_step_is_gymnasiums_to_the_last_bit() -> None:
     random = np.random.RandomState(0)
     for seed in range(10):
         env.reset(seed=seed)
-        state = cartpole_starts([seed])
+        state = CartPole().starts([seed])
         assert state.tolist() == [list(env.state)]
         ended = False
         while not ended:

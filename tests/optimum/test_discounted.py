@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum import best_return, discounted, pendulum_returns
-from keras_pendulum.optimum.discounted import discounted_value, exact_q, solve_discounted
+from keras_pendulum.optimum.discounted import discounted_value, solve_discounted
+from keras_pendulum.optimum.dynamics import TORQUES
+from keras_pendulum.optimum.pendulum import PendulumSolution
 from keras_pendulum.optimum.pendulum_returns import discounted_return
 from keras_pendulum.optimum.solutions import optimal_return
-from keras_pendulum.optimum.stored_results import Problem, write
+from keras_pendulum.optimum.stored_results import Problem, write_arrays
 from keras_pendulum.optimum.value_iteration import solve, value_at
 
 pytestmark = pytest.mark.quick
@@ -56,8 +58,8 @@ def test_exact_q_satisfies_bellmans_equation(gravity: float, discount: float) ->
     table = coarse_table(gravity, discount)
     theta = np.linspace(-np.pi, 0, CELLS + 1)
     for row in (0, 700, 1600, 2500, 3200):
-        speed = np.full(CELLS + 1, -8 + row * 0.005)
-        q = exact_q(table, gravity, discount, theta, speed)
+        states = np.stack([theta, np.full(CELLS + 1, -8 + row * 0.005)], axis=1)
+        q = PendulumSolution(Pendulum(gravity)).exact_q(table, discount, states, TORQUES)
         assert q.shape == (CELLS + 1, 41)
         np.testing.assert_allclose(q.max(axis=1), table[row], atol=0.005)
 
@@ -66,11 +68,11 @@ def test_exact_q_is_the_reward_and_the_discounted_value_after_a_step_of_gymnasiu
     table = solve_discounted(10, 0.9, CELLS)
     env: Any = gymnasium.make("Pendulum-v1", g=10.0).unwrapped
     torques = np.array([-2.0, 0.3, 1.77])
-    theta, speed = np.array([0.5, -3.0, 2.0]), np.array([-7.9, 0.0, 4.0])
-    q = exact_q(table, 10, 0.9, theta, speed, torques)
+    states = np.array([(0.5, -7.9), (-3.0, 0.0), (2.0, 4.0)])
+    q = PendulumSolution(Pendulum(10.0)).exact_q(table, 0.9, states, torques)
     for i, j in np.ndindex(3, 3):
         env.reset()
-        env.state = np.array([theta[i], speed[i]])
+        env.state = states[i]
         reward = float(env.step(torques[j : j + 1])[1])
         value = value_at(table, env.state[:1], env.state[1:])[0]
         assert q[i, j] == pytest.approx(reward + 0.9 * value, abs=1e-9)
@@ -106,7 +108,8 @@ def test_table_that_cannot_be_right_is_computed_again(
 ) -> None:
     right = discounted_value(1, 0.5)
     (path,) = cache.iterdir()
-    write(path, Problem.valid(1, discount=0.5), value=damage(right))
+    arrays = {**Problem.valid(1, discount=0.5)._asdict(), "value": damage(right)}
+    write_arrays(path, arrays)
     for _ in range(2):
         np.testing.assert_array_equal(discounted_value(1, 0.5), right)
     assert solved == [discounted.CELLS] * 2
@@ -135,7 +138,7 @@ def test_shipped_returns_are_below_the_optimum_by_what_the_discount_costs(
 def test_shipped_returns_are_those_of_a_computation(solved: list[int]) -> None:
     shipped = discounted_return(1, 0.9, range(20))
     computed = best_return.compute_returns(
-        Problem.valid(1, discount=0.9), pendulum_starts(range(20))
+        Problem.valid(1, discount=0.9), Pendulum().starts(range(20))
     )
     assert computed.mean() == pytest.approx(shipped.mean(), abs=0.1)
     assert solved == [best_return.DISCOUNTED_CELLS]

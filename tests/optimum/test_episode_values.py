@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
-from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.optimum import episode_values as module
 from keras_pendulum.optimum.episode_values import (
     COLUMNS,
@@ -26,7 +26,7 @@ from keras_pendulum.optimum.value_iteration import solve
 
 def values_at_starts(values: EpisodeValues, count: int) -> Any:
     """Returns V at the grid points that are next to the starts of the first reset seeds."""
-    theta, speed = pendulum_starts(range(count)).T
+    theta, speed = Pendulum().starts(range(count)).T
     sign = np.where(theta > 0, -1, 1)  # V of the mirrored state is the same
     rows = np.rint((sign * speed / 8 + 1) / 2 * (ROWS - 1)).astype(int)
     columns = np.rint((1 - np.abs(theta) / np.pi) * (COLUMNS - 1)).astype(int)

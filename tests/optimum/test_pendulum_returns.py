@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum import best_return as module
 from keras_pendulum.optimum.best_return import best_return
@@ -22,7 +22,7 @@ GRID = np.linspace(-2, 2, 41)  # N·m
 
 
 def starts(count: int) -> Array:
-    return pendulum_starts(range(count))
+    return Pendulum().starts(range(count))
 
 
 def gymnasium_return(env: Any, start: Array, torques: list[float]) -> float:

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from keras_pendulum.optimum.solutions import optimal_return
-from keras_pendulum.optimum.stored_results import Problem, read_returns, write
+from keras_pendulum.optimum.stored_results import Problem, read_returns, write_arrays
 
 pytestmark = pytest.mark.quick
 Array = NDArray[np.float64]
@@ -51,8 +51,8 @@ def archive(**changes: Any) -> bytes:
 
 
 def write_returns(path: Path, problem: Problem, returns: dict[int, float]) -> None:
-    values = np.array(list(returns.values()))
-    write(path, problem, seeds=np.array(list(returns)), returns=values)
+    arrays = {"seeds": np.array(list(returns)), "returns": np.array(list(returns.values()))}
+    write_arrays(path, problem._asdict() | arrays)
 
 
 def test_returns_are_computed_once_and_stored_with_later_seeds(

@@ -50,7 +50,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def coarse_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     """Makes an optimum that the package does not have coarse, which is much faster."""
     from keras_pendulum.optimum.episode_values import EpisodeValues, episode_values, solve_episode
-    from keras_pendulum.page import learning, task_content
+    from keras_pendulum.page import build, learning
     from keras_pendulum.page.learning import highest_return
 
     def values(gravity: float) -> EpisodeValues:
@@ -59,7 +59,7 @@ def coarse_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     def highest(task: Task) -> float:
         return highest_return(task) if task.gravity in (None, 1, 10) else 0.0
 
-    monkeypatch.setattr(task_content, "episode_values", values)
+    monkeypatch.setattr(build, "episode_values", values)
     monkeypatch.setattr(learning, "highest_return", highest)
 
 

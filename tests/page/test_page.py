@@ -13,7 +13,7 @@ from page_fixtures import coarse_optimum
 from selenium.webdriver.common.by import By
 
 import keras_pendulum as kp
-from keras_pendulum.environments.pendulum import pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.figures.curves import PRESET_STYLES, curve_style
 from keras_pendulum.page import __main__ as page_command
 from keras_pendulum.version import __version__
@@ -33,7 +33,7 @@ def test_two_networks_run_in_step_from_one_start(
     player.press("t")
     assert [player.text(f"name-{i}") for i in (0, 1)] == ["you", "two"]
     player.press("t")
-    player.run("pendulum.reset(arguments[0], arguments[1])", *pendulum_starts([3])[0].tolist())
+    player.run("pendulum.reset(arguments[0], arguments[1])", *Pendulum().starts([3])[0].tolist())
     player.run("for (let i = 0; i < 200; i++) pendulum.step()")
     scores = [kp.evaluate_policy(files[name], 1, 3) for name in ("one", "two")]
     found = player.run("return pendulum.page.episodes.map(e => e.return)")

@@ -17,7 +17,7 @@ from selenium.webdriver.common.keys import Keys
 import keras_pendulum as kp
 from keras_pendulum.dqn.policy import greedy_policy
 from keras_pendulum.environments.actions import TorqueGrid
-from keras_pendulum.environments.pendulum import Pendulum, pendulum_starts
+from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.page.training import _encode
 
 TOLERANCE = 1e-4
@@ -47,7 +47,7 @@ def test_200_steps_agree_with_gymnasium_and_the_policy(
             q = policy.q_values(observation)
             np.testing.assert_allclose(row["qValues"], q, rtol=0, atol=TOLERANCE)
             action = int(q.argmax())
-            page_action = grid.nearest_index(row["effort"])
+            page_action = int(np.abs(grid.torques - row["effort"]).argmin())
             if page_action != action and q[action] - q[page_action] < TIE:
                 action, ties = page_action, ties + 1
             observation, reward, _, over, _ = env.step(grid.to_env_action(action))
@@ -92,7 +92,7 @@ def test_optimum_of_a_start_is_the_exact_one(
     name: str, gravity: float, pages: dict[str, str], player: Player
 ) -> None:
     player.open_paused(pages[name])
-    starts = pendulum_starts(range(60)).tolist()
+    starts = Pendulum().starts(range(60)).tolist()
     found = player.run("return arguments[0].map(s => pendulum.page.optimum.returnFrom(s))", starts)
     shortfall = kp.optimal_return(gravity, range(60)) - found
     assert shortfall.min() > -0.01  # a simulated return cannot be above the optimum

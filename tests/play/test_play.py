@@ -30,13 +30,11 @@ from keras_pendulum.evaluate.sources import as_policy
 from keras_pendulum.figures import drawing
 from keras_pendulum.figures.drawing import Writer
 from keras_pendulum.figures.moment import draw_portrait
-from keras_pendulum.figures.pendulum_scene import draw_pendulum
 from keras_pendulum.figures.scenes import scene
 from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
 from keras_pendulum.play import __main__ as play_command
 from keras_pendulum.play.control_c import control_c
-from keras_pendulum.play.episode import ManualEpisode
-from keras_pendulum.play.game import READY_FRAMES, Game, Key, View
+from keras_pendulum.play.game import READY_FRAMES, Game, Key
 from keras_pendulum.play.played_task import PLAYED_TASKS, played_task
 from keras_pendulum.play.window import Window, play
 
@@ -153,7 +151,7 @@ def test_pole_that_falls_ends_the_drive_and_the_network_balances_it(no_window: N
 def test_held_key_acts_until_it_is_released(task: Any, no_window: None) -> None:
     keys = {1: [pygame.K_h, pygame.K_l], 4: -pygame.K_l, 7: [pygame.K_j, -pygame.K_l]}
     player = play_game({**keys, 9: [-pygame.K_j, pygame.K_ESCAPE]}, task=task)
-    push = scene(task).largest_effort
+    push = scene(task).dynamics.largest_effort
     without = [push, -push, push] if isinstance(task, CartPole) else [0.0] * 3
     assert player.torques == [push] * 3 + without + [-push] * 2
 
@@ -169,14 +167,6 @@ def test_pole_leans_to_the_side_of_its_angle(angle: float, side: str) -> None:
     pixels = pygame.surfarray.array3d(scene(CartPole()).draw(state, 0.0, (500, 456)))
     pole = (abs(pixels.astype(int) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
     assert (pole[:250].sum() > 3 * pole[250:].sum()) == (side == "left")
-
-
-def test_force_that_cartpole_has_not_is_refused() -> None:
-    played = played_task(CartPole())
-    episode = ManualEpisode(played, CartPole().make_env(), seed=0)
-    for force in (0.0, 5.0, float("nan")):
-        with pytest.raises(ValueError, match="expected -10 or 10"):
-            episode.step(force)
 
 
 def test_game_starts_without_a_key_and_without_torque(no_window: None) -> None:
@@ -259,8 +249,8 @@ def test_no_text_overlaps_another_or_leaves_the_window(
 ) -> None:
     boxes, show = record_texts(monkeypatch), Window.show
 
-    def check(self: Window, view: View) -> None:
-        show(self, view)
+    def check(self: Window, game: Game) -> None:
+        show(self, game)
         require_legible_texts(boxes, self._screen.get_size())
         boxes.clear()
 
@@ -273,15 +263,12 @@ def test_no_text_overlaps_another_or_leaves_the_window(
     assert play_game(keys, seed=999, task=CartPole(), policy=agent).frames == 600
 
 
-PLAYED = played_task(Pendulum())
-
-
 def portrait(path: Any, earlier: Any = ()) -> Any:
     """Returns the pixels [1000, 640, 3] of a phase portrait."""
     screen = pygame.Surface((1000, 640))
     screen.fill(drawing.WHITE)
     place = pygame.Rect(500, 48, 500, 456)
-    draw_portrait(screen, Writer(screen).write, place, scene(Pendulum()), path, earlier)
+    draw_portrait(Writer(screen), place, scene(Pendulum()), path, earlier)
     return pygame.surfarray.array3d(screen)
 
 
@@ -296,15 +283,21 @@ def test_path_does_not_cross_the_portrait_where_the_angle_jumps() -> None:
     assert (portrait([(3.1, 2.0)]) == portrait([(-3.1, 2.0), (3.1, 2.0)])).all()
 
 
+def drawn_pendulum(angle: float, torque: float) -> Any:
+    """Returns the pixels [500, 456, 3] of the pendulum at an angle."""
+    observation = np.array([np.cos(angle), np.sin(angle), 0], np.float32)
+    return pygame.surfarray.array3d(scene(Pendulum()).draw(observation, torque, (500, 456)))
+
+
 @pytest.mark.parametrize(("angle", "side"), [(0.5 * np.pi, "left"), (-0.5 * np.pi, "right")])
 def test_pendulum_is_drawn_counterclockwise_from_upright(angle: float, side: str) -> None:
-    pixels = pygame.surfarray.array3d(draw_pendulum(angle, 0.0, (500, 456)))
+    pixels = drawn_pendulum(angle, 0.0)
     rod = (abs(pixels.astype(int) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
     assert (rod[:250].sum() > 3 * rod[250:].sum()) == (side == "left")
 
 
 def test_arrow_of_the_torque_has_a_white_border_on_the_rod() -> None:
-    pixels = pygame.surfarray.array3d(draw_pendulum(np.pi, 2.0, (500, 456))).astype(int)
+    pixels = drawn_pendulum(np.pi, 2.0).astype(int)
     below = pixels[250, 228 + 20 :]  # from the pivot down, along the hanging rod
     colors = {"rod": drawing.ROD, "arrow": rgb(COUNTERCLOCKWISE), "border": drawing.WHITE}
     crossed: list[str] = []
@@ -346,15 +339,6 @@ def test_strip_along_the_lower_edge_grows_with_the_episode(no_window: None) -> N
     strips = [(row_pixels == drawing.LINE).all(axis=-1) for row_pixels in rows]
     assert [int(strip.sum()) for strip in strips] == [0, 500, 1000]
     assert strips[1][:500].all()
-
-
-def test_invalid_torque_is_refused_before_the_environment() -> None:
-    episode = ManualEpisode(PLAYED, Pendulum().make_env(), seed=0)
-    for torque in (float("nan"), float("inf"), -2.001, 40.0):
-        with pytest.raises(ValueError, match="expected a number from -2 to 2"):
-            episode.step(torque)
-    episode.step(2.0)
-    assert [episode.total_reward] == gymnasium_rewards([2.0], seed=0)
 
 
 @pytest.fixture(scope="module")
@@ -620,7 +604,7 @@ def test_control_c_that_pygame_drops_ends_play_at_the_next_frame() -> None:
         def key_events(self) -> list[tuple[Key, bool]]:
             return []
 
-        def show(self, view: object) -> None:
+        def show(self, game: object) -> None:
             self.frames += 1
             assert self.frames < 10, "the game does not end"
             if self.frames == 2:

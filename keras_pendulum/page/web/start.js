@@ -40,7 +40,7 @@ async function start() {
   }
 }
 
-/** Resolves to the numbers that `task_content` has compressed. */
+/** Resolves to the numbers that `build.py` has compressed. */
 async function decodedWords(text) {
   const compressed = new Blob([decodedBytes(text)]).stream();
   const stream = compressed.pipeThrough(new DecompressionStream("deflate"));
