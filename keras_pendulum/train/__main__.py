@@ -78,7 +78,6 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.resume and arguments.init:
         raise UserError("--init starts a new run, --resume continues one: give only one of them")
     require_tensorflow()
-    live = _live_plot(config) if arguments.live else None
 
     with fast_import():
         from keras_pendulum.storage.find_weights import find_weights
@@ -99,10 +98,9 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.init:
         init = load_weights(find_weights(arguments.init), config.activation)
 
-    if live:
-        live.config = config
     folder = RunFolder(out, config.environment)
     log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
+    live = _live_plot(config) if arguments.live else None
     progress = make_progress(config, arguments.quiet)
     report = _Report(config, folder, progress)
     try:
