@@ -79,7 +79,6 @@ def test_snapshots_change_nothing_in_the_run(
     ("owner", "name", "call"),
     [
         (RunFolder, "append", 5),  # after the snapshot of episode 3, before a checkpoint
-        (RunFolder, "append", 11),
         (SnapshotsFile, "_take_if_due", 1),  # before the initial network is kept
         # Before the snapshot after 6 episodes, with its checkpoint.
         (SnapshotsFile, "_take_if_due", 7),
