@@ -85,7 +85,9 @@ def test_torque_beyond_rounding_is_shown_with_its_digits() -> None:
         kp.evaluate_policy(lambda observation: 2.0001, 1)
 
 
-def test_run_folder_is_an_agent_everywhere(tmp_path: Path, in_process: Command) -> None:
+def test_run_folder_is_an_agent_everywhere(
+    short_ending: None, tmp_path: Path, in_process: Command
+) -> None:
     config = kp.preset("reference", hidden_units=(8,), episodes=2)
     network = kp.train_dqn(config, tmp_path / "run").network
     regret = kp.evaluate_policy(network, 2).regret

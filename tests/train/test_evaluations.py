@@ -65,8 +65,7 @@ def evaluated(history: list[EpisodeRecord]) -> dict[int, float]:
 
 
 def assert_weights(path: Path, expected: list[Any]) -> None:
-    for found, wanted in zip(kp.load_weights(path).get_weights(), expected, strict=True):
-        np.testing.assert_array_equal(found, wanted)
+    np.testing.assert_equal(kp.load_weights(path).get_weights(), expected)
 
 
 def test_starts_are_not_those_of_the_results_and_their_optimum_is_never_computed_alone() -> None:

@@ -217,15 +217,6 @@ def test_folder_with_a_long_name_raises() -> None:
         RunFolder("a" * 300, "Pendulum-v1")
 
 
-def test_on_checkpoint_can_save_weights_during_the_write(tmp_path: Path) -> None:
-    kp.train_dqn(
-        replace(CONFIG, episodes=8, save_every=1),
-        tmp_path,
-        on_checkpoint=lambda network, episode: kp.save_weights(network, tmp_path / f"{episode}.h5"),
-    )
-    assert len(list(tmp_path.glob("*[0-9].h5"))) == 8
-
-
 def test_picture_shows_the_optimal_and_the_random_return(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -65,8 +65,7 @@ def test_snapshots_are_the_networks_of_the_run(
         assert each.average_reward == result.history[each.episodes - 1].average_reward
     assert (found[0].weights != found[1].weights).any()
     newest = kp.load_weights(folder / FILE)
-    for one, two in zip(newest.get_weights(), result.network.get_weights(), strict=True):
-        np.testing.assert_array_equal(one, two)
+    np.testing.assert_equal(newest.get_weights(), result.network.get_weights())
 
 
 def test_snapshots_change_nothing_in_the_run(
