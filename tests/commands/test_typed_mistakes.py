@@ -6,7 +6,6 @@ import json
 import pickle
 from pathlib import Path
 
-import gymnasium
 import keras
 import numpy as np
 import pytest
@@ -73,9 +72,8 @@ def test_keras_model_of_other_inputs_is_named() -> None:
 
 
 @pytest.mark.parametrize("excess", [2e-7, 1e-6])
-def test_torque_within_rounding_is_the_limit(excess: float) -> None:
+def test_torque_of_an_output_within_rounding_is_the_limit(excess: float) -> None:
     expected = kp.evaluate_policy(lambda observation: 2.0, 1).mean_return
-    assert kp.evaluate_policy(lambda observation: 2.0 + excess, 1).mean_return == expected
     outputs = kp.q_function(lambda batch: np.eye(2)[[1] * len(batch)], torques=[-2, 2 + excess])
     assert kp.evaluate_policy(outputs, 1).mean_return == expected
 
@@ -109,12 +107,6 @@ def test_edited_config_json_is_said_to_be_unused(tmp_path: Path, in_process: Com
     assert result.returncode == 0
     assert "config.json is not used" in result.stderr
     assert json.loads(file.read_text())["discount"] == 0.9
-
-
-def test_action_is_in_the_action_space() -> None:
-    env = gymnasium.make("Pendulum-v1")
-    policy = kp.load_policy("reference")
-    assert env.action_space.contains(policy(env.reset(seed=0)[0]))
 
 
 def test_results_can_be_compared_and_pickled() -> None:
