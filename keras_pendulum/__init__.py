@@ -8,11 +8,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from keras_pendulum.tensorflow_setup import (
-    fast_import,
-    require_tensorflow,
-    set_environment_defaults,
-)
+from keras_pendulum.tensorflow_setup import fast_import, set_environment_defaults
 from keras_pendulum.version import __version__
 
 if TYPE_CHECKING:
@@ -89,7 +85,6 @@ set_environment_defaults()
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    require_tensorflow()
     with fast_import():
         module = importlib.import_module(f"keras_pendulum.{_MODULES[name]}")
     value = globals()[name] = getattr(module, name)

@@ -122,8 +122,9 @@ def fast_import() -> Iterator[None]:
     """Imports TensorFlow and Keras in its `with` block, without garbage collection and notes.
 
     Their import creates so many permanent objects that collecting takes two fifths of its time
-    (benchmarks/speed/import_time.py).
+    (benchmarks/speed/import_time.py). Raises UserError as `require_tensorflow` does.
     """
+    require_tensorflow()
     imported, enabled = "tensorflow" in sys.modules, gc.isenabled()
     gc.disable()
     try:

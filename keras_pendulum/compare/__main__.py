@@ -14,7 +14,7 @@ from keras_pendulum.completion import complete_with, folders
 from keras_pendulum.errors import UserError, one_line
 from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.tensorflow_setup import fast_import
 
 if TYPE_CHECKING:
     from keras_pendulum.compare.runs import ComparedRun
@@ -47,7 +47,6 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 
 def _compare(arguments: argparse.Namespace) -> int:
-    require_tensorflow()
     require_no_other_file(Path(arguments.out), b"\x89PNG", "a PNG")
     require_ending("--out", arguments.out, ".png")
 

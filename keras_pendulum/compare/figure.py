@@ -24,9 +24,8 @@ if TYPE_CHECKING:
 def draw_comparison(runs: Sequence[ComparedRun], optimum: float | None) -> bytes:
     """Returns a PNG with the learning curves on the left and the greedy regrets on the right.
 
-    Args:
-        runs: at least one, all of the same task.
-        optimum: the best possible value of the curves; None draws no line for it.
+    There is at least one run, and all are of the same task. The optimum is the best possible value
+    of the curves; None draws no line for it.
     """
     from matplotlib.figure import Figure
 
@@ -51,7 +50,6 @@ def draw_comparison(runs: Sequence[ComparedRun], optimum: float | None) -> bytes
 
 
 def _draw_curves(axes: Axes, runs: Sequence[ComparedRun], rows: Sequence[RegretRow]) -> None:
-    """Draws the learning curves."""
     from matplotlib.ticker import EngFormatter, MaxNLocator
 
     task = runs[0].config.task

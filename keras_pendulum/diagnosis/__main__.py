@@ -22,7 +22,7 @@ from keras_pendulum.completion import complete_with, weights_files
 from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.tensorflow_setup import fast_import
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.diagnose") -> int:
@@ -75,7 +75,6 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 
 def _diagnose(arguments: argparse.Namespace) -> int:
-    require_tensorflow()
     if arguments.report:
         require_ending("--report", arguments.report, ".html")
         require_no_other_file(Path(arguments.report), b"<!DOCTYPE html>", "an HTML file")

@@ -24,7 +24,7 @@ from keras_pendulum.errors import UserError
 from keras_pendulum.evaluate.film_command import add_film_flags, make_films, require_film_files
 from keras_pendulum.status import status
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.tensorflow_setup import fast_import
 
 
 def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulum.evaluate") -> int:
@@ -74,7 +74,6 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 
 def _evaluate(arguments: argparse.Namespace) -> int:
-    require_tensorflow()
     require_film_files(arguments)
 
     with fast_import():

@@ -16,7 +16,7 @@ from keras_pendulum.errors import UserError
 from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.tensorflow_setup import fast_import
 
 _HEAD = b"<!doctype html>\n<!-- keras_pendulum page:"  # the first bytes of every page
 
@@ -75,7 +75,6 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 
 def _write(arguments: argparse.Namespace) -> int:
-    require_tensorflow()
     if arguments.open:
         _require_browser()
 

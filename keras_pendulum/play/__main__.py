@@ -25,7 +25,7 @@ from keras_pendulum.environments.tasks import declared_task
 from keras_pendulum.play.control_c import control_c
 from keras_pendulum.storage.find_weights import find_weights
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.tensorflow_setup import fast_import
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -94,7 +94,6 @@ def _play(arguments: argparse.Namespace) -> int:
 
 def _load_policy(file: Path, activation: str | None) -> Policy:
     """Returns the greedy policy of a weights file."""
-    require_tensorflow()
     with fast_import():
         from keras_pendulum.evaluate.sources import load_policy
 

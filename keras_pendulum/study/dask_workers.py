@@ -37,10 +37,9 @@ _IGNORE_CONTROL_C = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)
 
 @contextmanager
 def local_workers(count: int) -> Iterator[Client]:
-    """Starts a scheduler in this process, reachable from this machine only, and its workers.
+    """Starts a scheduler in this process, reachable from this machine only, and `count` workers.
 
-    Args:
-        count: how many worker processes; each computes on one thread.
+    Each worker is a process that computes on one thread.
 
     Raises UserError when no worker has started within a minute.
     """

@@ -32,16 +32,10 @@ _STYLE_WITHOUT_CURVE: CurveStyle = ("0.45", "-", "o")
 
 
 def draw_study(rows: Sequence[Row], results: Mapping[str, Sequence[RunResult]]) -> bytes:
-    """Draws the arms' regrets on the left, and their curves on the right, a panel for each task.
+    """Returns a PNG with the arms' regrets on the left, and their curves on the right.
 
-    A curve is the greedy regret over the episodes. A dotted line is that of random actions.
-
-    Args:
-        rows: at least one, from top to bottom.
-        results: the runs by the arm's name.
-
-    Returns:
-        A PNG file's bytes.
+    The curves have a panel for each task. A curve is the greedy regret over the episodes. A dotted
+    line is that of random actions. There is at least one row; the results are by the arm's name.
     """
     from matplotlib.figure import Figure
 

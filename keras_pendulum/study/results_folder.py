@@ -32,11 +32,6 @@ class ResultsFolder:
     """The results of all arms with the seeds 0, 1, ….
 
     Arms with the same training share their runs; the files have the first arm's name.
-
-    Args:
-        path: the folder.
-        arms: of the study.
-        seeds: number of runs of each arm.
     """
 
     def __init__(self, path: Path, arms: Sequence[Arm], seeds: int) -> None:
@@ -105,10 +100,7 @@ class ResultsFolder:
         ]
 
     def missing_jobs(self, report: Callable[[str], None] = lambda line: None) -> list[Job]:
-        """Returns the jobs without a valid result.
-
-        Args:
-            report: called with a line for each file that holds no valid result.
+        """Returns the jobs without a valid result; `report` gets a line for each invalid file.
 
         Raises UserError for a result that is a link, a device or larger than any result.
         """

@@ -34,13 +34,8 @@ def run_all(
 
     Each worker has one job at a time, so that a killed worker interrupts no other job. A job that
     raises UserError has failed. After another exception it is repeated, up to three attempts. Dask
-    repeats the job of a lost worker, up to a limit of its scheduler.
-
-    Args:
-        client: of the Dask scheduler.
-        work: runs a job on a worker.
-        jobs: the jobs.
-        report: called with a line for each lost worker and each repeated job.
+    repeats the job of a lost worker, up to a limit of its scheduler. `report` gets a line for each
+    lost worker and each repeated job.
 
     Raises UserError when the connection to the scheduler is lost.
     """

@@ -18,7 +18,7 @@ from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.shipped_weights import shipped_names
-from keras_pendulum.tensorflow_setup import fast_import, require_tensorflow
+from keras_pendulum.tensorflow_setup import fast_import
 from keras_pendulum.train.closing_lines import next_lines, result_lines
 from keras_pendulum.train.listeners import Listener
 from keras_pendulum.train.progress import Progress, make_progress
@@ -77,8 +77,6 @@ def _train(arguments: argparse.Namespace) -> int:
     out = Path(arguments.out or Path("runs") / f"{config.preset}-seed{config.seed}")
     if arguments.resume and arguments.init:
         raise UserError("--init starts a new run, --resume continues one: give only one of them")
-    require_tensorflow()
-    live = _live_plot(config) if arguments.live else None
 
     with fast_import():
         from keras_pendulum.storage.find_weights import find_weights
@@ -99,10 +97,9 @@ def _train(arguments: argparse.Namespace) -> int:
     if arguments.init:
         init = load_weights(find_weights(arguments.init), config.activation)
 
-    if live:
-        live.config = config
     folder = RunFolder(out, config.environment)
     log = TensorBoardLog(folder.events, config) if arguments.tensorboard else None
+    live = _live_plot(config) if arguments.live else None
     progress = make_progress(config, arguments.quiet)
     report = _Report(config, folder, progress)
     try:

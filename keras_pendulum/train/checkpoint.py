@@ -35,11 +35,8 @@ def save_checkpoint(run: Run, path: str | os.PathLike[str]) -> None:
 class CheckpointWriter:
     """A writer of checkpoints whose disk is written by a thread while the run continues.
 
-    The end of the `with` block waits for the last file.
-
-    Args:
-        path: the file.
-        require_not_moved: raises UserError when the run's folder was moved.
+    The end of the `with` block waits for the last file. `require_not_moved` raises UserError when
+    the run's folder was moved.
     """
 
     def __init__(
@@ -113,12 +110,9 @@ def _dataset_names(variables: Variables) -> Variables:
 
 
 def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool = False) -> Run:
-    """Returns the run in a checkpoint, ready to continue.
+    """Returns the run in a checkpoint, ready to continue; with `render`, it has a window.
 
-    Args:
-        path: the checkpoint.
-        config: the settings of the run; only `episodes` and those of Recording may differ.
-        render: whether to show the environment in a window.
+    Of the settings, only `episodes` and those of Recording may differ from the recorded ones.
 
     Raises:
         WeightsError: the file is damaged, or holds weights without a run.

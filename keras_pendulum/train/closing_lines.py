@@ -20,12 +20,8 @@ def result_lines(
 ) -> str:
     """Returns the lines about the training and the score of its final weights.
 
-    Args:
-        config: the settings of the run.
-        result: the run.
-        folder: its folder.
-        seconds: duration of the training in this process.
-        new_episodes: number of episodes in this process; 0 after a resumed run that was finished.
+    In this process, the training took `seconds` for `new_episodes`: 0 where a finished run was
+    resumed.
     """
     from keras_pendulum.optimum.solutions import solution
 

@@ -31,12 +31,6 @@ def run_listeners(
        the second one when it is resumed.
     5. The others, which show the run: they see files that are complete.
 
-    Args:
-        run: the run.
-        folder: its folder.
-        writer: writes its large files.
-        others: the listeners of the caller.
-
     Raises WeightsError when a file of a resumed run is damaged or belongs to another run.
     """
     history = HistoryFile(run, folder)
@@ -97,11 +91,7 @@ class SnapshotsFile(Listener):
 class CheckpointFile(Listener):
     """Writes the checkpoint every `save_every` episodes, at the end, and for the best weights.
 
-    Args:
-        run: the run.
-        writer: writes the file.
-        best: the best weights, if they are kept.
-        followers: their `on_checkpoint` is called at each checkpoint.
+    At each checkpoint, it calls `on_checkpoint` of the followers.
     """
 
     def __init__(
@@ -168,17 +158,14 @@ class BestWeightsFile(Listener):
     def on_episode(self, record: EpisodeRecord) -> None:
         """Replaces the file by the present weights if they are the best."""
         if self.are_beaten_by(record):
-            self._write(record)
-
-    def _write(self, record: EpisodeRecord) -> None:
-        evaluation = {
-            "episode": np.array(record.episode, np.int64),
-            "regret": np.array(record.greedy_regret, np.float64),
-        }
-        online = self._run.agent.online
-        content = encode_weights(online, online.get_weights(), evaluation=evaluation)
-        self._writer.write(self._path, content)
-        self._regret = record.greedy_regret
+            evaluation = {
+                "episode": np.array(record.episode, np.int64),
+                "regret": np.array(record.greedy_regret, np.float64),
+            }
+            online = self._run.agent.online
+            content = encode_weights(online, online.get_weights(), evaluation=evaluation)
+            self._writer.write(self._path, content)
+            self._regret = record.greedy_regret
 
 
 def due_episodes(count: int, episodes: int) -> list[int]:

@@ -36,25 +36,7 @@ class Listener:
 
 
 class FunctionListener(Listener):
-    """A listener that calls functions; those that are not given do nothing."""
+    """A listener whose methods are these functions; the others do nothing."""
 
-    def __init__(
-        self,
-        on_episode: Callable[[EpisodeRecord], None] = lambda record: None,
-        *,
-        on_checkpoint: Callable[[DQN, int], None] = lambda network, episode: None,
-        on_phase: Callable[[Phase], None] = lambda phase: None,
-    ) -> None:
-        self._functions = on_episode, on_checkpoint, on_phase
-
-    def on_episode(self, record: EpisodeRecord) -> None:
-        """Calls the first function."""
-        self._functions[0](record)
-
-    def on_checkpoint(self, network: DQN, episode: int) -> None:
-        """Calls the second function."""
-        self._functions[1](network, episode)
-
-    def on_phase(self, phase: Phase) -> None:
-        """Calls the third function."""
-        self._functions[2](phase)
+    def __init__(self, **functions: Callable[..., None]) -> None:
+        vars(self).update(functions)

@@ -21,17 +21,11 @@ class LivePlot(Listener):
     In a notebook it draws into the cell's output, else in a window. The run continues when the user
     closes the window.
 
-    Args:
-        config: the settings of the run.
-
-    Attributes:
-        config: the same; it may be set until the first episode.
-
     Raises UserError when there is neither a notebook nor a display.
     """
 
     def __init__(self, config: Config) -> None:
-        self.config = config
+        self._config = config
         self._history: list[EpisodeRecord] = []
         self._levels: dict[str, float] | None = None  # known from the first drawing on
         self._canvas = _NotebookOutput() if in_notebook() else _Window()
@@ -67,9 +61,11 @@ class LivePlot(Listener):
         from keras_pendulum.train.reference_returns import reference_returns, run_title
 
         if self._levels is None:
-            self._levels = reference_returns(self.config)
-        title = run_title(self.config)
-        return draw_live(self._history, self.config.task, self._levels, title, self.config.episodes)
+            self._levels = reference_returns(self._config)
+        title = run_title(self._config)
+        return draw_live(
+            self._history, self._config.task, self._levels, title, self._config.episodes
+        )
 
 
 class _NotebookOutput:

@@ -18,11 +18,8 @@ def train_episodes(
 ) -> Iterator[EpisodeRecord]:
     """Trains from the next episode of the run to its last, and yields each episode's record.
 
-    After the last episode, the moving average replaces the online weights.
-
-    Args:
-        run: the run.
-        evaluate: returns the greedy regret after an episode, NaN where it is not evaluated.
+    After the last episode, the moving average replaces the online weights. `evaluate` returns the
+    greedy regret after an episode, NaN where it is not evaluated.
 
     Raises UserError, with episode and step, when an observation, a reward or a loss is not finite.
     """

@@ -86,7 +86,8 @@ def train_dqn(
     warn_if_not_reproducible()
     folder = None if out is None else RunFolder(out, config.environment)
     followers = [
-        each if isinstance(each, Listener) else FunctionListener(each) for each in listeners
+        each if isinstance(each, Listener) else FunctionListener(on_episode=each)
+        for each in listeners
     ]
     followers.append(FunctionListener(on_checkpoint=on_checkpoint, on_phase=on_phase))
     with contextlib.ExitStack() as stack:
@@ -112,19 +113,21 @@ def train_dqn(
                 # no policy of another run stays in the folder.
                 save_checkpoint(run, folder.weights)
                 folder.remove_old_run()
+        score = None
         if folder is None:
             finished = _train(run, followers, should_stop)
-            return _report(TrainingResult(run.agent.online, run.history, finished), followers)
-        with CheckpointWriter(folder.weights, folder.require_not_moved) as writer:
-            all_listeners = run_listeners(run, folder, writer, followers)
-            folder.start_files(config, run.history)
-            finished = _train(run, all_listeners, should_stop)
-        score = None
-        if finished:
-            run.announce("evaluating")
-            score = evaluate_policy(run.agent.online)
-        result = _report(TrainingResult(run.agent.online, run.history, finished, score), followers)
-        if score is not None:
+        else:
+            with CheckpointWriter(folder.weights, folder.require_not_moved) as writer:
+                all_listeners = run_listeners(run, folder, writer, followers)
+                folder.start_files(config, run.history)
+                finished = _train(run, all_listeners, should_stop)
+            if finished:
+                run.announce("evaluating")
+                score = evaluate_policy(run.agent.online)
+        result = TrainingResult(run.agent.online, run.history, finished, score)
+        for follower in followers:
+            follower.on_result(result)
+        if folder is not None and score is not None:
             run.announce("drawing")
             _draw(run, folder, score)
     return result
@@ -148,13 +151,6 @@ def _train(run: Run, listeners: Sequence[Listener], should_stop: Callable[[], bo
     for listener in listeners:
         listener.on_end()
     return len(run.history) == run.config.episodes
-
-
-def _report(result: TrainingResult, listeners: Sequence[Listener]) -> TrainingResult:
-    """Calls `on_result` of the listeners; returns the result."""
-    for listener in listeners:
-        listener.on_result(result)
-    return result
 
 
 def _draw(run: Run, folder: RunFolder, score: Score) -> None:

@@ -72,29 +72,6 @@ def test_folder_without_a_text_as_name_is_used_but_not_by_tensorboard(
     assert (tmp_path / film).exists()
 
 
-def test_progress_bar_in_latin_1_replaces_unknown_characters(
-    in_process: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
-    controller, terminal = pty.openpty()
-    with open(terminal, "w", encoding="latin-1") as output:
-        monkeypatch.setattr(sys, "stdout", output)
-        done = in_process("train", *words)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert b"?" in os.read(controller, 2**16)
-    os.close(controller)
-
-
-def test_closed_output_does_not_stop_training(
-    in_process: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    words = ["--preset", "original", "--hidden-units", "8", "--episodes", "2", "--out", "run"]
-    monkeypatch.setattr(sys, "stdout", None)  # as after `>&-`
-    done = in_process("train", *words)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "run" / "rewards.png").exists()
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /dev/full")
 def test_full_disk_of_the_output_is_one_error_line() -> None:
     # Buffered output, so that the last write fails.

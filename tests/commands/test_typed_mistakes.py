@@ -6,7 +6,6 @@ import json
 import pickle
 from pathlib import Path
 
-import gymnasium
 import keras
 import numpy as np
 import pytest
@@ -21,13 +20,11 @@ LONG = "n" * 250
     ("command", "words", "expected"),
     [
         ("evaluate", ("reference", "--torques", "-2,2"), "needs --torques=VALUE"),
-        ("train", ("--ep", "3"), "did you mean --episodes?"),
         ("evaluate", ("",), "the name of the weights file is empty"),
         ("evaluate", (LONG,), "no such file"),
         ("page", ("reference", "--out", f"{LONG * 2}.html"), "File name too long"),
         ("evaluate", ("reference", "--gif", "no/a.gif"), "there is no folder no"),
         ("page", ("reference", "--out", "no/a.html"), "there is no folder no"),
-        ("train", ("--init", "cartpole"), "holds a network for CartPole-v1 with the activation"),
         ("study", ("--arm", "A: reference tau=0.1 tau=0.2"), "the arm 'A' sets tau twice"),
     ],
 )
@@ -75,9 +72,8 @@ def test_keras_model_of_other_inputs_is_named() -> None:
 
 
 @pytest.mark.parametrize("excess", [2e-7, 1e-6])
-def test_torque_within_rounding_is_the_limit(excess: float) -> None:
+def test_torque_of_an_output_within_rounding_is_the_limit(excess: float) -> None:
     expected = kp.evaluate_policy(lambda observation: 2.0, 1).mean_return
-    assert kp.evaluate_policy(lambda observation: 2.0 + excess, 1).mean_return == expected
     outputs = kp.q_function(lambda batch: np.eye(2)[[1] * len(batch)], torques=[-2, 2 + excess])
     assert kp.evaluate_policy(outputs, 1).mean_return == expected
 
@@ -87,7 +83,9 @@ def test_torque_beyond_rounding_is_shown_with_its_digits() -> None:
         kp.evaluate_policy(lambda observation: 2.0001, 1)
 
 
-def test_run_folder_is_an_agent_everywhere(tmp_path: Path, in_process: Command) -> None:
+def test_run_folder_is_an_agent_everywhere(
+    short_ending: None, tmp_path: Path, in_process: Command
+) -> None:
     config = kp.preset("reference", hidden_units=(8,), episodes=2)
     network = kp.train_dqn(config, tmp_path / "run").network
     regret = kp.evaluate_policy(network, 2).regret
@@ -111,16 +109,10 @@ def test_edited_config_json_is_said_to_be_unused(tmp_path: Path, in_process: Com
     assert json.loads(file.read_text())["discount"] == 0.9
 
 
-def test_action_is_in_the_action_space() -> None:
-    env = gymnasium.make("Pendulum-v1")
-    policy = kp.load_policy("reference")
-    assert env.action_space.contains(policy(env.reset(seed=0)[0]))
-
-
 def test_results_can_be_compared_and_pickled() -> None:
     scores = [kp.evaluate_policy("reference", 1) for _ in range(2)]
     assert scores[0] == scores[0] != scores[1]
-    for agent in ("original", lambda observation: 0.0, kp.q_function(lambda batch: batch)):
+    for agent in ("original", kp.q_function(lambda batch: batch)):
         diagnosis = kp.diagnose(agent, gravity=1.0)
         copied = pickle.loads(pickle.dumps(diagnosis))
         assert copied.summary() == diagnosis.summary()
@@ -152,9 +144,6 @@ def test_picture_that_cannot_be_made_leaves_the_score(
 
 
 def test_progress_shows_a_line_for_each_episode(capsys: pytest.CaptureFixture[str]) -> None:
-    kp.train_dqn(kp.preset(hidden_units=(8,), episodes=50), progress=True)
-    lines = [
-        line for line in capsys.readouterr().out.splitlines() if line != "" and "\r" not in line
-    ]
-    assert len([line for line in lines if line.startswith("Episode: ")]) == 50
-    assert "regret" not in "\n".join(lines)
+    kp.train_dqn(kp.preset(hidden_units=(8,), episodes=3), progress=True)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(",")[0] for line in lines] == [f"Episode: {i}" for i in range(3)]

@@ -31,14 +31,9 @@ def write(folder: Path, code: str) -> None:
     (folder / "mine.py").write_text(code)
 
 
-@pytest.mark.parametrize(
-    "words", [("evaluate", "--episodes", "1"), ("diagnose",)], ids=lambda words: words[0]
-)
-def test_json_is_all_of_the_output(
-    words: tuple[str, ...], tmp_path: Path, in_process: Command
-) -> None:
+def test_json_is_all_of_the_output(tmp_path: Path, in_process: Command) -> None:
     write(tmp_path, NOISY)
-    result = in_process(words[0], "mine.py:agent", "--json", *words[1:])
+    result = in_process("evaluate", "mine.py:agent", "--json", "--episodes", "1")
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["regret"] > 0
     assert "loading" in result.stderr

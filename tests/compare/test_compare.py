@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import matplotlib.image
-import numpy as np
 import pytest
 from conftest import Refusal
 
@@ -99,54 +96,6 @@ def test_wrong_folders_and_files_are_one_error_line(runs: Path, refusal: Refusal
         ([one, "--ot", "a.png"], "unrecognized arguments: --ot a.png; did you mean --out?"),
     ):
         assert message in refusal(compare.main, words)
-
-
-def changed(change: Callable[[h5py.File], object]) -> Callable[[Path], None]:
-    """Returns a function that changes the content of a checkpoint and removes its checksum."""
-
-    def apply(file: Path) -> None:
-        with h5py.File(file, "r+") as content:
-            change(content)
-
-    return apply
-
-
-def set_history(rows: object) -> Callable[[h5py.File], None]:
-    def change(content: h5py.File) -> None:
-        del content["run/history"]
-        content["run/history"] = rows
-
-    return change
-
-
-def flip_a_bit(file: Path) -> None:
-    content = bytearray(file.read_bytes())
-    content[len(content) // 2] ^= 1
-    file.write_bytes(content)
-
-
-@pytest.mark.parametrize(
-    ("damage", "message"),
-    [
-        (flip_a_bit, "its SHA-256 differs from the recorded one"),
-        (changed(set_history(np.ones((3, 5)))), "the file is damaged"),
-        (changed(set_history(np.ones(8))), "the file is damaged"),
-        (changed(set_history(np.full((3, 8), np.nan))), "the file is damaged"),
-        (changed(set_history([[0, 1, np.inf, 1, 1, 1, 1, 1.0]])), "episode_return inf"),
-        (changed(set_history(np.empty((0, 8)))), "its history has 0 steps"),
-        (changed(lambda content: content.pop("run/history")), "has no array run/history"),
-        (changed(lambda content: content.pop("run")), "holds weights without a run"),
-    ],
-)
-def test_damaged_run_is_one_error_line(
-    damage: Callable[[Path], None], message: str, tmp_path: Path, runs: Path, refusal: Refusal
-) -> None:
-    run = tmp_path.parent / f"{tmp_path.name}-run"
-    run.mkdir()
-    file = run / "pendulum_weight.h5"
-    file.write_bytes((runs / "one" / file.name).read_bytes())
-    damage(file)
-    assert message in refusal(compare.main, [str(runs / "one"), str(run)])
 
 
 @pytest.fixture

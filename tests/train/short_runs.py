@@ -21,10 +21,10 @@ def kill_at_call(owner: Any, name: str, call: int, patched: pytest.MonkeyPatch) 
     function: Callable[..., Any] = getattr(owner, name)
     calls = iter(range(1, 1000))
 
-    def wrapped(*arguments: Any) -> Any:
+    def wrapped(*arguments: Any, **named: Any) -> Any:
         if next(calls) == call:
             raise KilledError
-        return function(*arguments)
+        return function(*arguments, **named)
 
     patched.setattr(owner, name, wrapped)
 

@@ -28,8 +28,7 @@ def test_run_with_fewer_updates_than_planned_keeps_its_last_weights() -> None:
     config = kp.preset("cartpole", hidden_units=(8,), episodes=70, batch_size=1000)
     runs = [kp.train_dqn(config.change(average_updates=each)) for each in (1, 1500)]
     assert 0 < runs[0].history[-1].updates < config.total_updates / 2
-    for last, averaged in zip(*(run.network.get_weights() for run in runs), strict=True):
-        np.testing.assert_array_equal(last, averaged)
+    np.testing.assert_equal(*(run.network.get_weights() for run in runs))
 
 
 @pytest.mark.parametrize("preset", ["cartpole", "swingup"])

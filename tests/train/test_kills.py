@@ -79,10 +79,6 @@ def test_killed_and_resumed_run_equals_an_uninterrupted_run(name: str, resumed_r
         [record._replace(seconds=0.0) for record in resumed.history],
         [record._replace(seconds=0.0) for record in uninterrupted.history],
     )
-    for found, expected in zip(
-        resumed.agent.online.get_weights(), uninterrupted.agent.online.get_weights(), strict=True
-    ):
-        np.testing.assert_array_equal(found, expected)
     np.testing.assert_equal(resumed.agent.get_state(), uninterrupted.agent.get_state())
     np.testing.assert_equal(resumed.replay.get_state(), uninterrupted.replay.get_state())
     assert resumed.streams.get_state() == uninterrupted.streams.get_state()

@@ -8,7 +8,6 @@ from conftest import Command, ending_shortly
 from figure_texts import figure_of, require_legible
 
 import keras_pendulum as kp
-from keras_pendulum.errors import UserError
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.train import live_plot
 
@@ -48,7 +47,7 @@ def test_window_shows_the_curve_and_each_new_episode(window: live_plot.LivePlot)
 def test_plot_shows_the_learning_curve_of_the_run(
     preset: str, quantity: str, window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    window.config = kp.preset(preset, seed=7)
+    monkeypatch.setattr(window, "_config", kp.preset(preset, seed=7))
     monkeypatch.setattr(window, "_drawn", math.inf)  # the window draws nothing
     for episode in range(120):
         window.on_episode(record(episode))
@@ -59,6 +58,9 @@ def test_plot_shows_the_learning_curve_of_the_run(
             curve, epsilon = figure.axes
             assert (curve.get_ylabel(), len(curve.get_lines())) == (quantity, 5)
             assert epsilon.get_ylabel() == "Random actions (ε)"
+            for axes in figure.axes:  # the whole run, from the first episode on
+                low, high = axes.get_xlim()
+                assert low < 0 < window._config.episodes - 1 < high < 1.1 * window._config.episodes
             assert len(np.asarray(curve.get_lines()[1].get_ydata())) == episode + 1
 
 
@@ -102,24 +104,6 @@ def test_window_stays_open_after_the_run_until_it_is_closed(
     window.wait_until_closed()
     assert len(waits) == 3
     assert not pygame.display.get_init()
-
-
-def test_axes_span_the_whole_run_from_the_first_episode_on(
-    window: live_plot.LivePlot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    window.config = kp.preset("reference", episodes=300)
-    monkeypatch.setattr(window, "_drawn", math.inf)  # the window draws nothing
-    window.on_episode(record(0))
-    for axes in figure_of(window._picture).axes:
-        low, high = axes.get_xlim()
-        assert low < 0 < 299 < high < 330
-
-
-def test_live_plot_without_a_display_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"):
-        monkeypatch.delenv(name, raising=False)
-    with pytest.raises(UserError, match="no display"):
-        live_plot.LivePlot(kp.preset("original"))
 
 
 def test_train_live_without_a_display_prints_one_line_and_trains(in_process: Command) -> None:

@@ -65,8 +65,7 @@ def test_target_network_follows_the_rule_of_the_settings(
 ) -> None:
     agent = make_run(kp.preset("reference", hidden_units=(8,), **settings)).agent
     assert (agent.target is agent.online) == (settings["target_update"] == "none")
-    for ours, theirs in zip(agent.target.get_weights(), agent.online.get_weights(), strict=True):
-        np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_equal(agent.target.get_weights(), agent.online.get_weights())
     for network, value in ((agent.target, 0.0), (agent.online, 8.0)):
         network.set_weights([np.full(array.shape, value) for array in network.get_weights()])
     for step, value in enumerate(values, start=1):
@@ -176,8 +175,7 @@ def test_initial_network_replaces_the_seeded_weights() -> None:
     assert agent.online is not initial
     assert agent.online.metadata["preset"] == "reference"
     for network in (agent.online, agent.target):
-        for ours, theirs in zip(network.get_weights(), initial.get_weights(), strict=True):
-            np.testing.assert_array_equal(ours, theirs)
+        np.testing.assert_equal(network.get_weights(), initial.get_weights())
     observation = np.array([1, 0, 0], np.float32)
     q = initial(observation[np.newaxis]).numpy()[0]
     np.testing.assert_allclose(agent.policy.q_values(observation), q, atol=1e-6)

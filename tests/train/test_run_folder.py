@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,6 @@ import pytest
 from short_runs import SHORT, contents
 
 import keras_pendulum as kp
-from keras_pendulum.config.config import Config
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage import run_folder
 from keras_pendulum.storage.atomic_write import write_atomically
@@ -28,24 +28,27 @@ pytestmark = pytest.mark.usefixtures("short_ending")
 CONFIG = kp.preset("original", episodes=2, **SHORT)
 
 
+@pytest.mark.parametrize(("episodes", "last"), [(24, 24), (21, None)])
 def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    episodes: int, last: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    config = replace(CONFIG, episodes=24)
+    config = replace(CONFIG, episodes=episodes)
     contents: list[bytes] = []
+    calls: list[tuple[kp.DQN, int]] = []
 
     def write(path: Path, *parts: bytes, **options: Any) -> None:
         contents.append(b"".join(parts))
         write_atomically(path, *parts, **options)
 
     monkeypatch.setattr("keras_pendulum.storage.checksum.write_atomically", write)
-    kp.train_dqn(config, tmp_path / "run")
+    result = kp.train_dqn(config, tmp_path / "run", on_checkpoint=lambda *call: calls.append(call))
     assert (tmp_path / "run" / "pendulum_weight.h5").read_bytes() == contents[-1]
-    episodes = []
+    saved = []
     for content in contents:
         (tmp_path / "one.h5").write_bytes(content)
-        episodes.append(len(load_checkpoint(tmp_path / "one.h5", config).history))
-    assert episodes == [0, 1, 11, 21, 24]
+        saved.append(len(load_checkpoint(tmp_path / "one.h5", config).history))
+    assert saved == [0, 1, 11, 21] + [last] * (last is not None)
+    assert calls == [(result.network, count - 1) for count in saved[1:]]
 
 
 def full_disk(descriptor: int) -> None:
@@ -127,19 +130,11 @@ def test_removed_history_is_whole_again_after_the_next_checkpoint(tmp_path: Path
     ]
 
 
-@pytest.mark.parametrize(
-    "error",
-    [
-        OSError(24, "Too many open files", "DejaVuSans.ttf"),
-        ImportError("cannot open shared object"),
-    ],
-    ids=["OSError", "ImportError"],
-)
 def test_picture_that_cannot_be_drawn_is_drawn_by_resume(
-    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*arguments: object) -> bytes:
-        raise error
+        raise ImportError("cannot open shared object")
 
     with monkeypatch.context() as patched:
         patched.setattr("keras_pendulum.figures.run_figure.draw_run", fail)
@@ -222,15 +217,6 @@ def test_folder_with_a_long_name_raises() -> None:
         RunFolder("a" * 300, "Pendulum-v1")
 
 
-def test_on_checkpoint_can_save_weights_during_the_write(tmp_path: Path) -> None:
-    kp.train_dqn(
-        replace(CONFIG, episodes=8, save_every=1),
-        tmp_path,
-        on_checkpoint=lambda network, episode: kp.save_weights(network, tmp_path / f"{episode}.h5"),
-    )
-    assert len(list(tmp_path.glob("*[0-9].h5"))) == 8
-
-
 def test_picture_shows_the_optimal_and_the_random_return(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -272,50 +258,62 @@ def test_files_are_opened_and_removed_again_while_windows_has_them_open(
     assert not folder.picture.exists()
 
 
-@pytest.mark.parametrize("environment", ["pendulum", "cartpole"])
-@pytest.mark.parametrize("kind", ["best", "snapshots"])
-def test_best_weights_and_snapshots_of_another_run_are_removed(
-    kind: str, environment: str, tmp_path: Path
-) -> None:
-    name = f"{environment}_weight_{kind}.h5"
-    (tmp_path / name).touch()
-    with pytest.raises(kp.UserError, match=rf"already holds a run \({name}\)"):
-        kp.train_dqn(CONFIG, tmp_path)
+def test_best_weights_and_snapshots_of_another_run_are_removed(tmp_path: Path) -> None:
+    names = [
+        f"{task}_weight_{kind}.h5"
+        for task in ("pendulum", "cartpole")
+        for kind in ("best", "snapshots")
+    ]
+    for name in names:
+        (tmp_path / name).touch()
+        with pytest.raises(kp.UserError, match=rf"already holds a run \(.*{name}"):
+            kp.train_dqn(CONFIG, tmp_path)
     kp.train_dqn(CONFIG, tmp_path, overwrite=True)
-    assert not (tmp_path / name).exists()
+    assert not [name for name in names if (tmp_path / name).exists()]
 
 
-BEST = replace(CONFIG, evaluate_every=1, keep_best=True), "pendulum_weight_best.h5"
-SNAPSHOTS = replace(CONFIG, snapshots=2), "pendulum_weight_snapshots.h5"
+BOTH = replace(CONFIG, evaluate_every=1, keep_best=True, snapshots=2)
+BEST, SNAPSHOTS = "pendulum_weight_best.h5", "pendulum_weight_snapshots.h5"
+CHANGES: dict[str, dict[str, Any]] = {
+    "the run": {},
+    "another seed": {"seed": 1},
+    "another size": {"hidden_units": (9,)},
+}
+
+
+@pytest.fixture(scope="module")
+def runs(short_ending: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with the folders of three runs, each with best weights and snapshots."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name, changes in CHANGES.items():
+        kp.train_dqn(replace(BOTH, **changes), folder / name)
+    return folder
 
 
 @pytest.mark.parametrize(
-    ("file", "content", "message"),
+    ("name", "content", "message"),
     [
-        (BEST, b"damaged", "not an HDF5 file"),
+        (BEST, "damaged", "not an HDF5 file"),
         (BEST, "weights alone", "not those of an evaluation of this"),
-        (BEST, {"seed": 1}, "not those of an evaluation of this"),
-        (SNAPSHOTS, b"damaged", "not an HDF5 file"),
+        (BEST, "another seed", "not those of an evaluation of this"),
+        (SNAPSHOTS, "damaged", "not an HDF5 file"),
         (SNAPSHOTS, "weights alone", r"holds no snapshots of a run \(train --snapshots N\)"),
-        (SNAPSHOTS, {"seed": 1}, "snapshots are of another run; move it to another folder"),
-        (SNAPSHOTS, {"hidden_units": (9,)}, "its snapshots have wrong types, sizes or episodes"),
+        (SNAPSHOTS, "another seed", "snapshots are of another run; move it to another folder"),
+        (SNAPSHOTS, "another size", "its snapshots have wrong types, sizes or episodes"),
     ],
 )
 def test_other_file_in_place_of_best_weights_or_snapshots_stops_a_resumed_run(
-    file: tuple[Config, str], content: Any, message: str, tmp_path: Path
+    name: str, content: str, message: str, runs: Path, tmp_path: Path
 ) -> None:
-    config, name = file
-    kp.train_dqn(config, tmp_path / "run")
-    path = tmp_path / "run" / name
-    if isinstance(content, bytes):
-        path.write_bytes(content)
+    run = Path(shutil.copytree(runs / "the run", tmp_path / "run"))
+    if content == "damaged":
+        (run / name).write_bytes(b"damaged")
     elif content == "weights alone":
-        kp.save_weights(kp.DQN((8,)), path)
+        kp.save_weights(kp.DQN((8,)), run / name)
     else:
-        kp.train_dqn(replace(config, **content), tmp_path / "other")
-        (tmp_path / "other" / name).replace(path)
-    before = contents(path.parent)
+        shutil.copy(runs / content / name, run / name)
+    before = contents(run)
     with pytest.raises(kp.WeightsError, match=message) as caught:
-        kp.train_dqn(config, tmp_path / "run", resume=True)
+        kp.train_dqn(BOTH, run, resume=True)
     assert "\n" not in str(caught.value)
-    assert contents(path.parent) == before
+    assert contents(run) == before

@@ -1,8 +1,9 @@
-"""A checkpoint with content that no run has is refused by all that read it, and changes nothing."""
+"""A strange checkpoint is refused by all that read it, and one of an older version is read."""
 
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 import warnings
@@ -14,16 +15,20 @@ import h5py
 import numpy as np
 import pytest
 from conftest import Refusal
+from short_runs import contents
 
 import keras_pendulum as kp
 from keras_pendulum.compare import __main__ as compare
+from keras_pendulum.config.settings import RENAMED
 from keras_pendulum.page import __main__ as page
 from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.train import checkpoint
+from keras_pendulum.train.checkpoint import load_checkpoint
 from keras_pendulum.train.run import make_run
 
 CONFIG = kp.preset("original", episodes=3, hidden_units=(8,), snapshots=2, warmup_episodes=1)
-Change = Callable[[h5py.File], None]
+FILE = "pendulum_weight.h5"
+Change = Callable[[h5py.File], object]
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +77,25 @@ def text(content: bytes) -> Change:
     return array("run/state", np.frombuffer(content, np.uint8))
 
 
+def missing(name: str) -> Change:
+    """Returns a change that removes an array or a group."""
+    return lambda file: file.__delitem__(name)
+
+
 HISTORY, EVALUATIONS = "run/history", "run/evaluations"
 STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
+    "no run": (missing("run"), "weights without a run"),
+    "no state": (missing("run/state"), "has no array run/state"),
+    "no history": (missing(HISTORY), "has no array run/history"),
+    "state is a group": (
+        lambda file: (missing("run/state")(file), file.create_group("run/state")),
+        "has no array run/state",
+    ),
+    "state is not JSON": (text(b"\0" * 50), "damaged"),
+    "replay is an array": (array("replay", np.zeros(3), float), "damaged"),
+    "history of five columns": (array(HISTORY, np.ones((3, 5))), "damaged"),
+    "history of one dimension": (array(HISTORY, np.ones(8)), "damaged"),
+    "history without an episode": (array(HISTORY, np.empty((0, 8))), "its history has 0 steps"),
     "return that is infinite": (number(HISTORY, (1, 2), np.inf), "1 has episode_return inf"),
     "return of 1e308": (number(HISTORY, (1, 2), 1e308), r"episode_return 1e\+308"),
     "reward that is NaN": (number(HISTORY, (2, 1), np.nan), "2 has average_reward nan"),
@@ -121,12 +143,8 @@ STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
 
 
 def change_checkpoint(run: Path, change: Change) -> None:
-    with h5py.File(run / "pendulum_weight.h5", "r+") as file:
+    with h5py.File(run / FILE, "r+") as file:
         change(file)
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {file.name: file.read_bytes() for file in folder.iterdir()}
 
 
 @pytest.mark.parametrize("kind", STRANGE)
@@ -134,25 +152,24 @@ def test_strange_checkpoint_is_refused_in_one_line(kind: str, run: Path) -> None
     change, message = STRANGE[kind]
     change_checkpoint(run, change)
     with pytest.raises(kp.WeightsError, match=rf"pendulum_weight\.h5: .*{message}") as caught:
-        load_recorded_run(run / "pendulum_weight.h5")
+        load_recorded_run(run / FILE)
     assert str(caught.value).isprintable()
 
 
 def test_sound_checkpoint_is_read_by_all(run: Path) -> None:
-    recorded = load_recorded_run(run / "pendulum_weight.h5")
+    recorded = load_recorded_run(run / FILE)
     assert [record.episode for record in recorded.history] == [0, 1, 2]
     assert np.isnan(recorded.history[0].loss)
     assert recorded.config == CONFIG
     assert recorded.replay.action.shape == (600,)
 
 
-@pytest.mark.parametrize("kind", ["return that is infinite", "action 50", "deep JSON"])
 def test_every_reader_refuses_a_strange_checkpoint(
-    kind: str, run: Path, folder: Path, tmp_path: Path, refusal: Refusal
+    run: Path, folder: Path, tmp_path: Path, refusal: Refusal
 ) -> None:
-    change_checkpoint(run, STRANGE[kind][0])
+    change_checkpoint(run, STRANGE["action 50"][0])  # what is validated last
     before = contents(run)
-    expected = f"{run / 'pendulum_weight.h5'}: "
+    expected = f"{run / FILE}: "
     with pytest.raises(kp.WeightsError, match="pendulum_weight"):
         kp.train_dqn(CONFIG, run, resume=True)
     with pytest.raises(kp.WeightsError, match="pendulum_weight"):
@@ -162,21 +179,31 @@ def test_every_reader_refuses_a_strange_checkpoint(
     assert contents(run) == before
 
 
+TARGET, ITERATION = "target/dqn.head.bias", "optimizer/adam.iteration"  # bias: [41]
+MOMENTUM, VELOCITY = (f"optimizer/adam.dqn_head_bias_{name}" for name in ("momentum", "velocity"))
+
+
 @pytest.mark.parametrize(
-    ("name", "value", "message"),
+    ("change", "message"),
     [
-        ("optimizer/adam.iteration", -1, "iteration is -1; its history has 2 updates"),
-        ("optimizer/adam.dqn_head_bias_velocity", -np.ones(41), "velocity is negative"),
-        ("target/dqn.head.bias", np.full(41, 1e30), r"weight of the size 1e\+30"),
+        (array(ITERATION, -1), "iteration is -1; its history has 2 updates"),
+        (missing(ITERATION), "optimizer/adam/iteration is missing, unknown or of another shape"),
+        (array(VELOCITY, -np.ones(41)), "velocity is negative"),
+        (array(MOMENTUM, np.full(41, np.nan)), f"{MOMENTUM} holds NaN or infinite numbers"),
+        (missing("target"), "head/bias is missing, unknown or of another shape"),
+        (array(TARGET, np.full(41, 1e30)), r"weight of the size 1e\+30"),
+        (array(TARGET, np.zeros(42)), "head/bias is missing, unknown or of another shape"),
+        (number(TARGET, 0, np.inf), f"{TARGET} holds NaN or infinite numbers"),
     ],
 )
 def test_strange_training_state_is_refused_before_a_file_is_changed(
-    name: str, value: Any, message: str, run: Path
+    change: Change, message: str, run: Path
 ) -> None:
-    change_checkpoint(run, array(name, value))
+    change_checkpoint(run, change)
     before = contents(run)
-    with pytest.raises(kp.WeightsError, match=message):
+    with pytest.raises(kp.WeightsError, match=message) as caught:
         kp.train_dqn(CONFIG, run, resume=True)
+    assert "\n" not in str(caught.value)
     assert contents(run) == before
 
 
@@ -201,7 +228,7 @@ def test_run_without_an_episode_is_sound_and_not_compared(
 ) -> None:
     shutil.rmtree(run)
     run.mkdir()
-    path = run / "pendulum_weight.h5"
+    path = run / FILE
     checkpoint.save_checkpoint(make_run(CONFIG), path)
     assert load_recorded_run(path).history == []
     assert "no finished episode yet" in refusal(compare.main, [folder, path.parent])
@@ -213,9 +240,86 @@ def test_link_called_tensorboard_is_not_followed(run: Path, tmp_path: Path) -> N
     other.mkdir()
     (other / "events.out.tfevents.1.host").touch()
     (run / "tensorboard").symlink_to(other)
-    before = (run / "pendulum_weight.h5").read_bytes()
+    before = (run / FILE).read_bytes()
     for resume in (False, True):
         with pytest.raises(kp.UserError, match=r"run/tensorboard is a link, .*expected a folder"):
             kp.train_dqn(CONFIG, run, overwrite=not resume, resume=resume)
     assert (other / "events.out.tfevents.1.host").exists()
-    assert (run / "pendulum_weight.h5").read_bytes() == before
+    assert (run / FILE).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("preset", "mine"), ("gravity", 3.0), ("hidden_units", (9,)), ("gradient_clip", 100.0)],
+)
+def test_resuming_with_another_setting_raises_and_names_it(
+    name: str, other: Any, folder: Path
+) -> None:
+    message = f"this run has {name} {getattr(CONFIG, name)}, not {other}: "
+    with pytest.raises(kp.ConfigError, match=re.escape(message)):
+        load_checkpoint(folder / FILE, CONFIG.change(**{name: other}))
+
+
+def test_resumed_run_can_be_saved_and_evaluated_at_other_episodes(folder: Path) -> None:
+    other = CONFIG.change(save_every=3, episodes=4, evaluate_every=2, keep_best=True, snapshots=0)
+    assert load_checkpoint(folder / FILE, other).config == other
+
+
+def test_resumed_run_cannot_be_shorter_than_it_is(run: Path) -> None:
+    before = contents(run)
+    with pytest.raises(kp.ConfigError, match="has 3 episodes already; episodes is 2, expected at"):
+        kp.train_dqn(CONFIG.change(episodes=2), run, resume=True)
+    assert contents(run) == before
+
+
+def test_settings_without_an_effect_of_an_older_version_are_not_used(run: Path) -> None:
+    change_checkpoint(run, state(tau=0.5, target_period=7, keep_best=True))
+    assert load_checkpoint(run / FILE, CONFIG).config == CONFIG
+
+
+@pytest.mark.parametrize("name", RENAMED)
+def test_checkpoint_with_an_old_setting_is_refused_and_its_weights_load(
+    name: str, folder: Path, run: Path
+) -> None:
+    change_checkpoint(run, state(**{name: "a value"}))
+    message = rf"older version .*the setting {name}\) and cannot be resumed; use --init"
+    with pytest.raises(kp.WeightsError, match=message):
+        kp.train_dqn(CONFIG, run, resume=True)
+    weights = (kp.load_weights(each / FILE).get_weights() for each in (run, folder))
+    np.testing.assert_equal(*weights)
+
+
+def test_error_of_the_environment_is_not_reported_as_damage(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_window(*settings: object) -> None:
+        raise RuntimeError("no window")
+
+    monkeypatch.setattr("keras_pendulum.environments.task.Task.make_env", no_window)
+    with pytest.raises(RuntimeError, match=r"^no window$"):
+        load_checkpoint(folder / FILE, CONFIG)
+
+
+def test_checkpoint_of_other_versions_is_resumed_with_one_warning(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def change(file: h5py.File) -> None:
+        attributes = file["keras_pendulum"].attrs
+        versions = {**json.loads(attributes["versions"]), "keras": "3.0.0", "numpy": "2.0.0"}
+        attributes["versions"] = np.bytes_(json.dumps(versions))
+        attributes["version"] = np.bytes_("0.0.1")
+
+    change_checkpoint(run, change)
+    monkeypatch.setenv("TF_NUM_INTRAOP_THREADS", "7")
+    with pytest.warns(UserWarning) as caught:
+        load_checkpoint(run / FILE, CONFIG)
+    (message,) = (str(warning.message) for warning in caught)
+    assert message.startswith(
+        f"{run / FILE} was saved with keras_pendulum 0.0.1, keras 3.0.0, numpy 2.0"
+    )
+    assert "TF_NUM_INTRAOP_THREADS 1; these differ now" in message
+
+
+@pytest.mark.filterwarnings("error")
+def test_checkpoint_of_the_same_versions_is_resumed_without_warning(folder: Path) -> None:
+    load_checkpoint(folder / FILE, CONFIG)

@@ -24,10 +24,9 @@ from keras_pendulum.train.checkpoint import load_checkpoint
 CONFIG = kp.preset("original", episodes=3, **SHORT)
 
 
-# The other presets: test_checkpoint.py compares two runs of each.
-@pytest.mark.parametrize("name", ["walkthrough", "swingup"])
-def test_equal_seeds_give_runs_that_are_equal_bit_for_bit(name: str) -> None:
-    config = kp.preset(name, episodes=12, warmup_episodes=9, hidden_units=(8,))
+def test_equal_seeds_give_runs_that_are_equal_bit_for_bit() -> None:
+    # Other presets: test_checkpoint.py and test_kills.py compare two runs of each.
+    config = kp.preset("swingup", episodes=12, warmup_episodes=9, hidden_units=(8,))
     first = kp.train_dqn(config)
     assert first.history[-1].updates > 0
     assert_same(kp.train_dqn(config), first)
@@ -52,17 +51,6 @@ def test_listeners_get_the_record_of_each_episode() -> None:
     # A generator, which can be read only once.
     result = kp.train_dqn(CONFIG, listeners=(each.append for each in received))
     assert received == [result.history, result.history]
-
-
-@pytest.mark.parametrize(("episodes", "saved"), [(21, [0, 10, 20]), (13, [0, 10, 12])])
-def test_on_checkpoint_is_called_once_for_each_checkpoint(
-    episodes: int, saved: list[int], short_ending: None, tmp_path: Path
-) -> None:
-    calls: list[tuple[kp.DQN, int]] = []
-    config = replace(CONFIG, episodes=episodes)
-    result = kp.train_dqn(config, tmp_path, on_checkpoint=lambda *call: calls.append(call))
-    assert [episode for _, episode in calls] == saved
-    assert all(network is result.network for network, _ in calls)
 
 
 @pytest.mark.parametrize(("stop_after", "finished"), [(1, False), (3, True)])
