@@ -8,17 +8,21 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
+import numpy as np
+
 from keras_pendulum.diagnosis import comparisons, repairs
 from keras_pendulum.diagnosis.backup import Agreement
 from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.rollouts import few_steps
 
 RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _GROWN = 3.0  # spreads above the best possible value
 _UNRELATED = 0.5  # error of the right equation
 _SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
 _RIGHT_VALUES = 0.9  # correlation with the exact values
+_FEW_STEPS = 0.25  # error of the rewards of a few steps; that of rewards of another size is larger
 _BY_CHANCE = 0.1  # correlation of advantages that have not been learned
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
 _DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
@@ -67,6 +71,18 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         actions = comparisons.match_actions(m)
         return actions is not None and actions.declared > comparisons.SAME_ACTIONS
 
+    def is_short_training(equation: Equation) -> bool:
+        """Returns whether values of the declared task that look few steps ahead fit better."""
+        if not m.task.never_terminates:
+            return False
+        few = few_steps(m)
+        if equation.slope is not None:
+            return few.error < _FEW_STEPS
+        if equation.discount is None or equation.discount > m.discount:
+            return False
+        error = few.rollouts.q - few.rollouts.target(equation.discount)
+        return float(np.sqrt(np.mean(error**2))) / m.backup.spread > 0.5 * few.error
+
     def is_refuted(equation: Equation) -> bool:
         """Returns whether the exact values or the record show that this equation is not its own."""
         if m.excess > _DIVERGED and equation.variant != "frozen-target":
@@ -92,6 +108,8 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         if is_refuted(equation):
             continue
         if not equation.explains(own, right, not m.task.never_terminates):
+            continue
+        if is_short_training(equation):
             continue
         repair = _repair(m, equation)
         # A network that sees CartPole wrongly may have learned too little to balance with a repair.

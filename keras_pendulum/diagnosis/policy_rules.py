@@ -2,7 +2,7 @@
 
 A target that takes the mean of the next values learns the value of random actions; one that takes
 the lowest, that of the worst ones. Over one step, the sides of such an equation differ little from
-those of the right one. Over ten steps, the difference grows, and the network's own errors do not.
+those of the right one; over ten steps, they differ more.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from keras_pendulum.diagnosis.equation import RIGHT, NextAction
 from keras_pendulum.diagnosis.equation_rules import HEALTHY, RIGHT_ERROR, obeyed_equation, percent
 from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.rollouts import roll_out
 from keras_pendulum.diagnosis.target_equations import TARGETS
 
 _STEPS = 10
@@ -77,19 +78,7 @@ def followed_policy(m: Measurement) -> Finding | None:
 
 def _over_steps(m: Measurement, next_action: NextAction) -> _LongAgreement:
     """Returns how well the values agree with ten rewards and the value after them."""
-    random = np.random.RandomState(4)
-    states = m.visited.states
-    states = np.repeat(states[random.randint(len(states), size=_ROWS)], _REPEATS, axis=0)
-    action = np.repeat(random.randint(len(m.efforts), size=_ROWS), _REPEATS)
-    q = m.q_values(m.dynamics.observe(states))[np.arange(len(states)), action]
-    target, factor = np.zeros(len(states)), 1.0
-    for _ in range(_STEPS):
-        outcomes = m.dynamics.outcomes(states, m.efforts[action][:, None])
-        target += factor * outcomes.reward[:, 0]
-        factor *= m.discount
-        states = outcomes.state[:, 0]
-        values = m.q_values(m.dynamics.observe(states))
-        action = next_action(values, random)
-    target += factor * values[np.arange(len(states)), action]
-    error = (q - target).reshape(_ROWS, _REPEATS).mean(axis=1) / m.backup.spread
+    rollouts = roll_out(m, next_action, _STEPS, _ROWS, _REPEATS)
+    error = (rollouts.q - rollouts.target(m.discount)).reshape(_ROWS, _REPEATS).mean(axis=1)
+    error /= m.backup.spread
     return _LongAgreement(float(np.sqrt(np.mean(error**2))), float(error.mean()))
