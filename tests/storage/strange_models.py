@@ -142,9 +142,6 @@ STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
         lambda members: members.update({"config.json": b'{"class_name":' * 90_000}),
         "",
     ),
-    "assets": (lambda members: members.update({"assets/a": b"text"}), "holds assets/a of 4 bytes"),
-    "no metadata": (lambda members: members.pop("metadata.json"), "holds metadata.json of 0"),
-    "bomb": (lambda members: members.update({"metadata.json": bytes(10**7)}), "metadata.json of"),
     "huge weight": (weights(3e38), "has a weight of the size 3e.38; expected at most 1e.06"),
     "NaN": (weights(np.nan), "holds NaN"),
 }
