@@ -52,7 +52,7 @@ def encode_snapshots(network: DQN, snapshots: Sequence[Snapshot]) -> bytes:
         "average_reward": np.array([each.average_reward for each in snapshots], np.float64),
         "weights": np.stack([each.weights for each in snapshots]),
     }
-    return encode_weights(network, network.get_weights(), snapshots=arrays)
+    return encode_weights(network, snapshots=arrays)
 
 
 def read_snapshots(

@@ -99,7 +99,6 @@ def _encode(run: Run) -> bytes:
     }
     return encode_weights(
         online,
-        online.get_weights(),
         target=_dataset_names(agent["target"]),
         optimizer=_dataset_names(agent["optimizer"]),
         replay=replay,

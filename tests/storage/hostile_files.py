@@ -59,7 +59,7 @@ def write_sound(path: Path, layout: str) -> Path:
 def _sound(layout: str) -> bytes:
     if layout == "this package":
         dqn = kp.DQN((16, 8), 5)
-        return encode_weights(dqn, dqn.get_weights())  # with a checksum no change would be read
+        return encode_weights(dqn)  # with a checksum no change would be read
     with tempfile.TemporaryDirectory() as folder:
         suffix = {"whole model": ".h5", "Keras 3": ".weights.h5", "keras": ".keras"}[layout]
         path = Path(folder, f"a{suffix}")

@@ -16,9 +16,7 @@ import pytest
 import tensorflow as tf
 
 import keras_pendulum as kp
-from keras_pendulum.storage.checksum import write_with_checksum
 from keras_pendulum.storage.keras_h5 import _split
-from keras_pendulum.storage.save_weights import encode_weights
 
 pytestmark = pytest.mark.usefixtures("files_read_here")
 OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
@@ -33,11 +31,6 @@ def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
         "config": '{"seed": 7}',
     }
     return kp.DQN(hidden, actions, seed=3, metadata=metadata)
-
-
-def save_unchecked(network: kp.DQN, path: Path) -> None:
-    """Saves a network that `save_weights` may refuse."""
-    write_with_checksum(path, encode_weights(network, network.get_weights()))
 
 
 def dense_layers(keras_module: Any, hidden: tuple[int, ...], actions: int) -> list[Any]:
@@ -129,7 +122,7 @@ def make_changed(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
     """Returns a function that writes a valid file and changes something in it."""
 
     def make(path: Path) -> None:
-        save_unchecked(network(), path)
+        kp.save_weights(network(), path)
         with h5py.File(path, "r+") as file:
             change(file)
 
