@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,11 +37,6 @@ def take_snapshot(network: DQN, history: Sequence[EpisodeRecord]) -> Snapshot:
     flat = np.concatenate([array.ravel() for array in weights])
     reward = history[-1].average_reward if history else 0.0
     return Snapshot(len(history), reward, np.clip(flat, -_LARGEST, _LARGEST).astype(np.float16))
-
-
-def snapshots_file(checkpoint: Path) -> Path:
-    """Returns the file of the snapshots beside a checkpoint: `pendulum_weight_snapshots.h5`."""
-    return checkpoint.with_name(f"{checkpoint.stem}_snapshots{checkpoint.suffix}")
 
 
 def encode_snapshots(network: DQN, snapshots: Sequence[Snapshot]) -> bytes:
