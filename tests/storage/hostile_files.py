@@ -358,7 +358,7 @@ CONFIGS: dict[str, bytes] = {
 
 
 def packed(change: Callable[[dict[str, bytes]], None]) -> Change:
-    """Returns a change of the members of a zip file, which is written compressed."""
+    """Returns a change of the members of a zip file."""
 
     def change_file(path: Path, layout: str) -> None:
         members = read_members(path)
@@ -374,9 +374,11 @@ def read_members(path: Path) -> dict[str, bytes]:
 
 
 def write_members(path: Path, members: dict[str, bytes]) -> None:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+    """Writes a zip file. As in files of Keras, only members of many MB are compressed."""
+    with zipfile.ZipFile(path, "w") as file:
         for name, content in members.items():
-            file.writestr(name, content)
+            kind = zipfile.ZIP_STORED if len(content) < 10**7 else zipfile.ZIP_DEFLATED
+            file.writestr(name, content, kind)
 
 
 def member(name: str, content: bytes) -> Change:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import h5py
 import keras
 import numpy as np
+from hostile_files import read_members, write_members
 
 L = keras.layers
 Change = Callable[[dict[str, bytes]], object]  # of the members of the archive
@@ -28,21 +28,11 @@ def sound_model() -> Any:
     return keras.Model(inputs, L.Add(name="q")([value, advantage - mean]))
 
 
-def write_sound_model(path: Path) -> Any:
-    """Writes the sound model to `path`; returns it."""
-    model = sound_model()
-    model.save(path)
-    return model
-
-
 def change_members(path: Path, change: Change) -> None:
     """Changes the members of a `.keras` file."""
-    with zipfile.ZipFile(path) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
+    members = read_members(path)
     change(members)
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in members.items():
-            archive.writestr(name, content)
+    write_members(path, members)
 
 
 def config(change: Callable[[list[Any]], object]) -> Change:
