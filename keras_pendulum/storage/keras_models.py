@@ -55,7 +55,7 @@ def load_keras_model(path: str | os.PathLike[str]) -> keras.Model:
             if is_h5:
                 config = modernised(config)
             require_known_layers(config, name)
-            for array in file:
+            for array in file.shapes:
                 file.read(array)  # which must be finite
             stored = sum(map(math.prod, file.shapes.values()))
         text = json.dumps(config)  # Keras changes a configuration that it reads

@@ -99,7 +99,7 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
         if info.task is None and _takes_four(file.shapes.values()):
             info = replace(info, task=CartPole())
         task = _task(info)
-        layers = read_layers(file, path, task.observation_size, model)
+        layers = read_layers(file, task.observation_size, model)
     if model and not is_ours and layers[-1].activation is None:
         warnings.warn(
             f"{path} is a {model['class_name']}, whose code it does not hold: it is read as a "
