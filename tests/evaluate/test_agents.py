@@ -278,10 +278,13 @@ def test_torque_beyond_the_limit_by_a_rounding_is_the_limit() -> None:
         np.testing.assert_array_equal(answering(answer).act(OBSERVATIONS), np.full((9, 1), torque))
 
 
-def test_integers_of_a_function_are_indices_of_its_torques() -> None:
+def test_integers_of_an_agent_are_indices_of_its_torques() -> None:
     for index in (2, np.int64(2), np.array([2])):
         agent = as_policy(lambda observation, index=index: index, torques=[-2, 0, 1.5])
         np.testing.assert_array_equal(agent.act(OBSERVATIONS), np.full((9, 1), 1.5))
+    chooses = SimpleNamespace(choose_action=lambda observation: 2)
+    agent = as_policy(chooses, torques=[-2, 0, 1.5])
+    np.testing.assert_array_equal(agent.act(OBSERVATIONS), np.full((9, 1), 1.5))
     with pytest.raises(ActionError, match="the index 3; expected an integer from 0 to 2"):
         as_policy(lambda observation: 3, torques=[-2, 0, 1.5]).act(OBSERVATIONS)
 
@@ -343,17 +346,6 @@ def test_row_of_a_wrong_answer_is_known() -> None:
 def test_object_that_chooses_an_action_is_an_agent(method: str) -> None:
     agent = as_policy(type("Agent", (), {method: lambda self, observation: 1.5})())
     np.testing.assert_array_equal(agent.act(OBSERVATIONS), np.full((9, 1), 1.5))
-
-
-def test_object_that_chooses_an_index_needs_its_torques() -> None:
-    class Agent:
-        def choose_action(self, observation: Any) -> int:
-            return 2
-
-    returns = kp.evaluate_policy(Agent(), 2, gravity=1.0, torques=[-2, 0, 1.5]).returns
-    assert returns == pytest.approx(kp.evaluate_policy(lambda o: 1.5, 2, gravity=1.0).returns)
-    with pytest.raises(kp.UserError, match="for an index, give the torques"):
-        kp.evaluate_policy(Agent(), 2, gravity=1.0)
 
 
 def test_keras_model_of_one_row_gets_one_row(network: kp.DQN) -> None:

@@ -464,6 +464,10 @@ def add_activations(config: Any) -> None:
     config["config"]["layers"][2:2] = [linear] * 100_000
 
 
+def h5_as_keras(path: Path, layout: str) -> None:
+    path.write_bytes(read_members(path)["model.weights.h5"])
+
+
 BY_ZIP: dict[str, Change] = {
     "no config.json": removed("config.json"),
     "no metadata.json": removed("metadata.json"),
@@ -492,14 +496,8 @@ BY_ZIP: dict[str, Change] = {
     "data in another file": weights_of(BY_H5PY["data in another file"]),
     "990 links to 64 attributes": weights_of(opened(many_links_to_attributes)),
     **{name: member("config.json", text) for name, text in CONFIGS.items()},
+    "HDF5 in place of a zip file": h5_as_keras,
 }
-
-
-def h5_as_keras(path: Path, layout: str) -> None:
-    path.write_bytes(read_members(path)["model.weights.h5"])
-
-
-BY_ZIP["HDF5 in place of a zip file"] = h5_as_keras
 
 HOSTILE: dict[tuple[str, str], Change] = {
     **{

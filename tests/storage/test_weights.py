@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("files_read_here")
 OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
 
 
-def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
+def network() -> kp.DQN:
     metadata = {
         "environment": "Pendulum-v1",
         "gravity": 2.5,
@@ -30,21 +30,21 @@ def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
         "seed": 7,
         "config": '{"seed": 7}',
     }
-    return kp.DQN(hidden, actions, seed=3, metadata=metadata)
+    return kp.DQN((16, 8), 5, seed=3, metadata=metadata)
 
 
-def dense_layers(keras_module: Any, hidden: tuple[int, ...], actions: int) -> list[Any]:
-    layers = [keras_module.layers.Dense(units, activation="tanh") for units in hidden]
-    return [*layers, keras_module.layers.Dense(actions)]
+def dense_layers(keras_module: Any) -> list[Any]:
+    layers = [keras_module.layers.Dense(units, activation="tanh") for units in (16, 8)]
+    return [*layers, keras_module.layers.Dense(5)]
 
 
-def subclassed(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
+def subclassed(keras_module: Any) -> Any:
     """Returns a subclassed model, as the original's, in either version of Keras."""
 
     class Model(keras_module.Model):
         def __init__(self) -> None:
             super().__init__()
-            self.all = dense_layers(keras_module, hidden, actions)
+            self.all = dense_layers(keras_module)
 
         def call(self, inputs: Any) -> Any:
             for layer in self.all:
@@ -56,10 +56,8 @@ def subclassed(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: in
     return model
 
 
-def sequential(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
-    return keras_module.Sequential(
-        [keras_module.Input((3,)), *dense_layers(keras_module, hidden, actions)]
-    )
+def sequential(keras_module: Any) -> Any:
+    return keras_module.Sequential([keras_module.Input((3,)), *dense_layers(keras_module)])
 
 
 @pytest.fixture(scope="module")
