@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
-from typing import Any
+from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from keras_pendulum.environments.actions import Actions
+from keras_pendulum.environments.actions import Actions, TorqueActions, torque_actions
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import declared_task
@@ -34,6 +36,7 @@ class Policy(ABC):
 
     has_q_values = False
     one_by_one = False
+    _has_own_torques = True  # not only what its outputs stand for by default
 
     def __init__(self, name: str, info: RunInfo | None = None, actions: Actions | None = None):
         self.name = name
@@ -65,7 +68,7 @@ class Policy(ABC):
         """
         raise TypeError(f"{self.name} has no Q-values")
 
-    def with_environment(self, environment: str) -> Policy:
+    def with_environment(self, environment: str) -> Self:
         """Returns the policy as one of an environment, such as `CartPole-v1`.
 
         Raises ConfigError for an unknown environment, and where it is one of another.
@@ -80,16 +83,26 @@ class Policy(ABC):
             )
         return self
 
-    def _of_task(self, task: Task) -> Policy:
+    def _of_task(self, task: Task) -> Self:
         """Returns the policy, which records no task, as one of another task."""
-        raise ConfigError(f"{self.name} is an agent of {self.task.environment}")
+        if self._has_own_torques and self.actions is not None:
+            raise ConfigError(f"{self.name} has torques, which belong to {self.task.environment}")
+        changed = copy.copy(self)
+        changed.info, changed.actions = replace(self.info, task=task), task.actions()
+        return changed
 
-    def with_torques(self, torques: ArrayLike) -> Policy:
+    def with_torques(self, torques: ArrayLike) -> Self:
         """Returns the policy with other torques (N·m) for its outputs.
 
-        Raises ConfigError for torques that do not fit.
+        Raises ConfigError for torques that do not fit, and where it has others.
         """
-        raise ConfigError(f"torques are given, but {self.name} has torques of its own")
+        if self._has_own_torques:
+            raise ConfigError(f"torques are given, but {self.name} has torques of its own")
+        if not isinstance(self.actions, TorqueActions):
+            raise ConfigError(f"torques belong to Pendulum-v1; {self.task.environment} has none")
+        changed = copy.copy(self)
+        changed.actions = torque_actions(torques, self.actions.count)
+        return changed
 
     def reset(self) -> None:  # noqa: B027 - most policies have no state
         """Starts a new episode. A policy with a state forgets it here."""

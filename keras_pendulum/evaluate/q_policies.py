@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum.dqn.network import DQN
 from keras_pendulum.dqn.policy import GreedyPolicy
-from keras_pendulum.environments.actions import Actions, TorqueActions, torque_actions
+from keras_pendulum.environments.actions import Actions, torque_actions
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError, require_finite
@@ -44,6 +42,7 @@ class DQNPolicy(Policy):
 
     has_q_values = True
     one_by_one = True
+    _has_own_torques = False
     actions: Actions
 
     def __init__(self, network: DQN, name: str | None = None) -> None:
@@ -55,15 +54,7 @@ class DQNPolicy(Policy):
         self.actions = self.task.actions(network.action_count)
         self._greedy = GreedyPolicy(self.weights, self.activation)
 
-    def with_torques(self, torques: ArrayLike) -> DQNPolicy:
-        """Returns the policy with other torques (N·m) for its outputs."""
-        if not isinstance(self.actions, TorqueActions):
-            raise ConfigError(f"torques belong to Pendulum-v1; {self.task.environment} has none")
-        changed = copy.copy(self)
-        changed.actions = torque_actions(torques, self.actions.count)
-        return changed
-
-    def _of_task(self, task: Task) -> Policy:
+    def _of_task(self, task: Task) -> Self:
         raise ConfigError(
             f"{self.name} takes {self.task.observation_size} numbers; {task.environment} has "
             f"{task.observation_size}"
@@ -97,17 +88,15 @@ class QPolicy(Policy):
         self, function: Callable[[Any], Any], torques: ArrayLike | None, name: str
     ) -> None:
         super().__init__(name)
-        self._declared = torques is not None
+        self._has_own_torques = torques is not None
         self._function = function
         try:
-            values = q_values_of(call_agent(function, _EXAMPLES), len(_EXAMPLES))
+            values = _values(function, _EXAMPLES)
         except ActionError as error:
-            if self._declared:
+            if self._has_own_torques:
                 raise
             try:
-                values = q_values_of(
-                    call_agent(function, _CARTPOLE_EXAMPLES), len(_CARTPOLE_EXAMPLES)
-                )
+                values = _values(function, _CARTPOLE_EXAMPLES)
             except ActionError:
                 raise error from None
             q_values_of(values, len(_CARTPOLE_EXAMPLES), 2)
@@ -115,27 +104,10 @@ class QPolicy(Policy):
         else:
             self.actions = torque_actions(torques, values.shape[1])
 
-    def _of_task(self, task: Task) -> QPolicy:
+    def _of_task(self, task: Task) -> Self:
         """Returns the policy as one of CartPole. Raises ActionError where it has other values."""
-        if self._declared:
-            raise ConfigError(f"{self.name} has torques, which belong to {self.task.environment}")
-        answer = call_agent(self._function, _CARTPOLE_EXAMPLES)
-        q_values_of(answer, len(_CARTPOLE_EXAMPLES), task.actions().count)
-        changed = copy.copy(self)
-        changed.info, changed.actions = replace(self.info, task=task), task.actions()
-        return changed
-
-    def with_torques(self, torques: ArrayLike) -> QPolicy:
-        """Returns the policy with other torques (N·m) for its outputs.
-
-        Raises ConfigError for torques that do not fit, and where it has others.
-        """
-        if self._declared:
-            raise ConfigError(f"torques are given twice: {self.name} has torques of its own")
-        if not isinstance(self.actions, TorqueActions):
-            raise ConfigError(f"torques belong to Pendulum-v1; {self.task.environment} has none")
-        changed = copy.copy(self)
-        changed.actions = torque_actions(torques, self.actions.count)
+        changed = super()._of_task(task)
+        changed.q_values(_CARTPOLE_EXAMPLES)
         return changed
 
     def q_values(self, observations: ArrayLike) -> NDArray[Any]:
@@ -143,12 +115,18 @@ class QPolicy(Policy):
 
         Raises ActionError when the function raises an exception or returns anything else.
         """
-        array = np.asarray(observations, np.float32)
-        return q_values_of(call_agent(self._function, array), len(array), self.actions.count)
+        return _values(self._function, np.asarray(observations, np.float32), self.actions.count)
 
     def act(self, observations: Observations) -> NDArray[Any]:
         """Returns the actions with the highest Q-values."""
         return self.actions.values.take(best_of(self.q_values(observations)), axis=0)
+
+
+def _values(
+    function: Callable[[Any], Any], observations: Observations, count: int | None = None
+) -> NDArray[Any]:
+    """Returns the Q-values [B, A] of a function; `count` is A, where it is known."""
+    return q_values_of(call_agent(function, observations), len(observations), count)
 
 
 def q_function(

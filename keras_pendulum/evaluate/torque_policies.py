@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import inspect
 from dataclasses import replace
 from typing import Any
@@ -12,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum.environments.actions import torque_actions
 from keras_pendulum.environments.cartpole import CartPole
-from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.answers import (
@@ -62,14 +60,6 @@ class FunctionPolicy(Policy):
                 error.row = row
                 raise
         return np.stack(actions)
-
-    def _of_task(self, task: Task) -> FunctionPolicy:
-        """Returns the policy as one of CartPole."""
-        if self.actions is not None:
-            raise ConfigError(f"{self.name} has torques, which belong to {self.task.environment}")
-        changed = copy.copy(self)
-        changed.info, changed.actions = replace(self.info, task=task), task.actions()
-        return changed
 
     def _actions(self, observations: Observations) -> NDArray[Any]:
         """Returns the actions for observations [B, D], or that for one, [D]."""

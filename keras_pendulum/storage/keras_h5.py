@@ -39,79 +39,73 @@ class Layer(NamedTuple):
     activation: str | None  # None where the file does not record it
 
 
-def read_layers(
-    file: H5File, path: str, input_size: int, model: dict[str, Any] | None
-) -> list[Layer]:
+def read_layers(file: H5File, input_size: int, model: dict[str, Any] | None) -> list[Layer]:
     """Returns the layers in the order of their calls; the first has `input_size` inputs.
 
     Args:
         file: the open file.
-        path: its path, for messages.
         input_size: D, the size of an observation.
         model: the recorded configuration of a whole model.
 
     Raises WeightsError when the file holds no layers, other layers than a chain of Dense layers, or
     layers in an order that it does not determine.
     """
-    chain = dense_layers(model, path) if model else None
+    chain = dense_layers(model, file.path) if model else None
     # In a whole model, Keras 2 puts the weights into a group.
     root = "model_weights/" if "model_weights" in file else ""
     if "layer_names" in file.attributes.get(root.rstrip("/"), {}):
-        stored = _keras2_layers(file, path, root, chain is not None)
+        stored = _keras2_layers(file, root, chain is not None)
         keys = [root + layer.name for layer in chain or ()]
     else:
-        stored = _keras3_layers(file, path, chain is not None)
+        stored = _keras3_layers(file, chain is not None)
         keys = [f"layers/dense_{layer.number}".removesuffix("_0") for layer in chain or ()]
     if not stored:
-        raise WeightsError(f"{path}: holds no network weights in a layout of Keras 2 or Keras 3")
+        raise WeightsError(
+            f"{file.path}: holds no network weights in a layout of Keras 2 or Keras 3"
+        )
     if chain:
         by_group = {each.group: each for each in stored}
         for key in keys:
             if key not in by_group:
-                raise WeightsError(f"{path}: has no weights of layer {key}")
+                raise WeightsError(f"{file.path}: has no weights of layer {key}")
         ordered = [by_group[key] for key in keys]
     elif model and model.get("registered_name") == REGISTERED_NAME:
         # The hidden layers are in a list, and the head is not.
         ordered = sorted(stored, key=lambda each: (each.container is None, each.number))
     else:
-        ordered = call_order(stored, input_size, path)
+        ordered = call_order(stored, input_size, file.path)
     activations = [layer.activation for layer in chain] if chain else [None] * len(ordered)
     layers: list[Layer] = []
     for each, activation in zip(ordered, activations, strict=True):
-        layers.append(_read_layer(file, path, each, activation))
+        layers.append(_read_layer(file, each, activation))
         _, kernel, bias, _ = layers[-1]
         if kernel.shape[0] != input_size:
+            previous = "the previous layer" if layers[1:] else "an observation"
             raise WeightsError(
-                f"{path}: layer {each.name} has {kernel.shape[0]} inputs; expected {input_size}, "
-                f"the size of {'the previous layer' if layers[1:] else 'an observation'}"
+                f"{file.path}: layer {each.name} has {kernel.shape[0]} inputs; expected "
+                f"{input_size}, the size of {previous}"
             )
         input_size = bias.shape[0]
     return layers
 
 
-def _read_layer(file: H5File, path: str, stored: StoredLayer, activation: str | None) -> Layer:
+def _read_layer(file: H5File, stored: StoredLayer, activation: str | None) -> Layer:
     """Returns a layer. Raises WeightsError when it is not a Dense layer of finite numbers."""
+    layer = f"{file.path}: layer {stored.name}"
     if len(stored.arrays) != 2:
-        raise WeightsError(
-            f"{path}: layer {stored.name} has {len(stored.arrays)} arrays; expected kernel and bias"
-        )
+        raise WeightsError(f"{layer} has {len(stored.arrays)} arrays; expected kernel and bias")
     kernel, bias = map(file.read, stored.arrays)
     if kernel.dtype.kind != "f" or bias.dtype.kind != "f":
-        raise WeightsError(
-            f"{path}: layer {stored.name} has the type {kernel.dtype}; expected floating-point"
-        )
+        raise WeightsError(f"{layer} has the type {kernel.dtype}; expected floating-point")
     if kernel.ndim != 2 or bias.shape != kernel.shape[1:]:
         raise WeightsError(
-            f"{path}: layer {stored.name} has shapes {kernel.shape} and {bias.shape}; "
-            "expected a kernel [in, out] and a bias [out]"
+            f"{layer} has shapes {kernel.shape} and {bias.shape}; expected a kernel [in, out] and "
+            "a bias [out]"
         )
     if not 1 <= kernel.shape[1] <= _LARGEST_LAYER:
-        raise WeightsError(
-            f"{path}: layer {stored.name} has {kernel.shape[1]} units; expected 1 to "
-            f"{_LARGEST_LAYER}"
-        )
+        raise WeightsError(f"{layer} has {kernel.shape[1]} units; expected 1 to {_LARGEST_LAYER}")
     for array in (kernel, bias):
-        require_sane(array, f"layer {stored.name}", path)
+        require_sane(array, f"layer {stored.name}", file.path)
     return Layer(stored.name, kernel.astype(np.float32), bias.astype(np.float32), activation)
 
 
@@ -125,20 +119,20 @@ def require_sane(array: NDArray[Any], name: str, path: str | os.PathLike[str]) -
         )
 
 
-def _keras2_layers(file: H5File, path: str, root: str, is_chain: bool) -> list[StoredLayer]:
+def _keras2_layers(file: H5File, root: str, is_chain: bool) -> list[StoredLayer]:
     """Returns the layers with weights, in the order that the file records.
 
     `is_chain` says whether the recorded configuration has shown what the others do.
     """
-    names = _texts(file, path, root.rstrip("/"), "layer_names")
+    names = _texts(file, root.rstrip("/"), "layer_names")
     layers = []
     for number, name in enumerate(names):
-        weights = _texts(file, path, root + name, "weight_names")
+        weights = _texts(file, root + name, "weight_names")
         if names.index(name) != number:
-            raise WeightsError(f"{path}: has two layers of the name {name}")
+            raise WeightsError(f"{file.path}: has two layers of the name {name}")
         if not weights:
             if not is_chain:
-                _require_no_effect(path, name, name)
+                _require_no_effect(file.path, name, name)
             continue
         # The names of a subclassed model begin with its own. Its layers are in the order in which
         # its attributes were assigned.
@@ -148,7 +142,7 @@ def _keras2_layers(file: H5File, path: str, root: str, is_chain: bool) -> list[S
     return layers
 
 
-def _keras3_layers(file: H5File, path: str, is_chain: bool) -> list[StoredLayer]:
+def _keras3_layers(file: H5File, is_chain: bool) -> list[StoredLayer]:
     """Returns the layers with weights. Their paths name the attributes that hold them."""
     layers = []
     for group, attributes in file.attributes.items():
@@ -166,10 +160,12 @@ def _keras3_layers(file: H5File, path: str, is_chain: bool) -> list[StoredLayer]
         kind = key if containers[-1:] == ["layers"] else name
         if not arrays:
             if not is_chain:
-                _require_no_effect(path, name, kind)
+                _require_no_effect(file.path, name, kind)
             continue
         if containers[-1:] == ["layers"] and _split(kind)[0] != "dense":
-            raise UnknownLayersError(f"{path}: layer {name} is a {kind}; expected Dense layers")
+            raise UnknownLayersError(
+                f"{file.path}: layer {name} is a {kind}; expected Dense layers"
+            )
         stem, number = _split(key)
         if stem != "dense" or not _is_ordered(file, containers):
             container = None
@@ -200,11 +196,11 @@ def _require_no_effect(path: str, name: str, kind: str) -> None:
         )
 
 
-def _texts(file: H5File, path: str, group: str, attribute: str) -> list[str]:
+def _texts(file: H5File, group: str, attribute: str) -> list[str]:
     """Returns an attribute that is a list of names."""
     value = file.attributes.get(group, {}).get(attribute)
     if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
-        raise WeightsError(f"{path}: {group or 'the file'} has no readable {attribute}")
+        raise WeightsError(f"{file.path}: {group or 'the file'} has no readable {attribute}")
     return value
 
 

@@ -7,12 +7,10 @@ and Keras first builds the model in a TensorFlow graph, which has all sizes and 
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import os
 import tempfile
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +24,7 @@ from keras_pendulum.storage.known_layers import modernised, refuse_model, requir
 from keras_pendulum.storage.model_config import read_model
 from keras_pendulum.storage.quarantine import open_h5
 
-_MEMBERS = {"config.json": 2**20, "metadata.json": 2**16, "model.weights.h5": 2**26}  # bytes
+_LARGEST_FILE = 2**26  # bytes
 _HDF5 = b"\x89HDF"
 _RECURRENT = (keras.layers.RNN, keras.layers.Bidirectional, keras.layers.TimeDistributed)
 _MOST_STEPS = 512  # of all recurrent layers together, each step of which takes time
@@ -40,16 +38,14 @@ def load_keras_model(path: str | os.PathLike[str]) -> keras.Model:
     list, or sizes that its weights do not have.
     """
     name = os.fsdecode(path)
+    content = _read(name)
+    is_h5 = content.startswith(_HDF5)
     with tempfile.TemporaryDirectory() as folder:
-        content, text = _read(name), None
-        if is_h5 := content.startswith(_HDF5):
-            weights = Path(folder, "model.h5")  # Keras asks the ending for the layout
-        else:
-            weights = Path(folder, "model.weights.h5")
-            content, text = _unpack(name, content)
-        weights.write_bytes(content)  # a private file: no other program changes the bytes
-        with open_h5(weights, name) as file:
-            recorded = file.attributes[""].get("model_config") if is_h5 else text
+        # A private file: no other program changes the bytes. Keras asks the ending for the layout.
+        private = Path(folder, "model.h5" if is_h5 else "model.keras")
+        private.write_bytes(content)
+        with open_h5(private, name) as file:
+            recorded = file.attributes[""].get("model_config")
             if recorded is None:
                 raise UnknownLayersError(
                     f"{name}: holds weights alone, of other layers than Dense: save the whole "
@@ -59,14 +55,14 @@ def load_keras_model(path: str | os.PathLike[str]) -> keras.Model:
             if is_h5:
                 config = modernised(config)
             require_known_layers(config, name)
-            for array in file:
+            for array in file.shapes:
                 file.read(array)  # which must be finite
             stored = sum(map(math.prod, file.shapes.values()))
         text = json.dumps(config)  # Keras changes a configuration that it reads
         try:
             _require_sizes(text, stored, name)
             model = _build(text)
-            model.load_weights(weights)
+            model.load_weights(private)
             for weight in model.weights:
                 require_sane(weight.numpy(), f"layer {weight.path}", name)
         except UserError:
@@ -81,40 +77,17 @@ def _read(path: str) -> bytes:
 
     Raises WeightsError for a large file, and for one that is neither `.keras` nor HDF5.
     """
-    largest = sum(_MEMBERS.values())
     try:
         with open(path, "rb") as file:
-            content = file.read(largest + 1)
+            content = file.read(_LARGEST_FILE + 1)
     except OSError as error:
         raise WeightsError(f"{path}: cannot be read ({error})") from error
-    if not content.startswith((b"PK\x03\x04", _HDF5)) or len(content) > largest:
+    if not content.startswith((b"PK\x03\x04", _HDF5)) or len(content) > _LARGEST_FILE:
         raise WeightsError(
-            f"{path}: not a .keras or .h5 file of at most {largest >> 20} MiB; a model with other "
-            "layers than Dense is loaded from such a file"
+            f"{path}: not a .keras or .h5 file of at most {_LARGEST_FILE >> 20} MiB; a model with "
+            "other layers than Dense is loaded from such a file"
         )
     return content
-
-
-def _unpack(path: str, content: bytes) -> tuple[bytes, str]:
-    """Returns the HDF5 file in a `.keras` file, a ZIP archive, and its `config.json`.
-
-    Raises WeightsError for other members than those of Keras, and for larger ones.
-    """
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members = [(each.filename, each.file_size) for each in archive.infolist()]
-            names = [member for member, _ in members]
-            for member, size in [*members, *((name, 0) for name in _MEMBERS)]:
-                if size > _MEMBERS.get(member, -1) or names.count(member) != 1:
-                    raise WeightsError(
-                        f"{path}: holds {member} of {size} bytes; expected {', '.join(_MEMBERS)}, "
-                        "once and not larger than usual; for another model, give file.py:name"
-                    )
-            return archive.read("model.weights.h5"), archive.read("config.json").decode()
-    except UserError:
-        raise
-    except Exception as error:  # damage causes any error of zipfile
-        raise WeightsError(f"{path}: cannot be read, the file is damaged ({error})") from error
 
 
 def _build(text: str) -> Any:

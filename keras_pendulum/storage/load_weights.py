@@ -91,16 +91,16 @@ def read_network(path: str) -> tuple[str | None, RunInfo, list[Layer]]:
         root = file.attributes[""]
         model = read_model(root["model_config"], path) if "model_config" in root else None
         attributes = file.attributes.get(GROUP, {})
-        if model and model.get("registered_name") == REGISTERED_NAME:
+        is_ours = model is not None and model.get("registered_name") == REGISTERED_NAME
+        if model and is_ours:
             config = model["config"]
             attributes = {name: config[name] for name in config if config[name] is not None}
         info = read_info(attributes, path)
         if info.task is None and _takes_four(file.shapes.values()):
             info = replace(info, task=CartPole())
         task = _task(info)
-        layers = read_layers(file, path, task.observation_size, model)
-    ours = model is not None and model.get("registered_name") == REGISTERED_NAME
-    if model and not ours and layers[-1].activation is None:
+        layers = read_layers(file, task.observation_size, model)
+    if model and not is_ours and layers[-1].activation is None:
         warnings.warn(
             f"{path} is a {model['class_name']}, whose code it does not hold: it is read as a "
             "chain of its Dense layers. If its call does more, give the agent of your program: "

@@ -50,7 +50,7 @@ class H5File:
     """
 
     def __init__(self, path: str, output: IO[bytes], size: int) -> None:
-        self._path = path
+        self.path = path
         self._output = output
         output.seek(0)
         description = json.loads(output.readline(LARGEST_DESCRIPTION + 1))
@@ -76,10 +76,6 @@ class H5File:
         """Returns whether the file has such a group or array."""
         return name in self.attributes
 
-    def __iter__(self) -> Iterator[str]:
-        """Yields the paths of the arrays."""
-        return iter(self.shapes)
-
     def read(self, name: str, *, finite: bool = True) -> NDArray[Any]:
         """Returns an array.
 
@@ -87,14 +83,14 @@ class H5File:
         numbers.
         """
         if name not in self.shapes:
-            raise WeightsError(f"{self._path}: has no array {name}")
+            raise WeightsError(f"{self.path}: has no array {name}")
         place, dtype = self._places[name]
         self._output.seek(place)
         content = bytearray(self._output.read(math.prod(self.shapes[name]) * dtype.itemsize))
         array = np.frombuffer(content, dtype).reshape(self.shapes[name])
         with np.errstate(over="ignore"):  # a number too large for float32 becomes infinite
             if finite and not np.isfinite(array.astype(np.float32, copy=False)).all():
-                raise WeightsError(f"{self._path}: {name} holds NaN or infinite numbers")
+                raise WeightsError(f"{self.path}: {name} holds NaN or infinite numbers")
         return array
 
 

@@ -61,23 +61,23 @@ class RecordedRun:
 def load_recorded_run(path: str | os.PathLike[str]) -> RecordedRun:
     """Returns what a checkpoint records of its run. Raises WeightsError as `read_run` does."""
     with open_h5(path) as file:
-        return read_run(file, path)
+        return read_run(file)
 
 
-def read_run(file: H5File, path: str | os.PathLike[str]) -> RecordedRun:
+def read_run(file: H5File) -> RecordedRun:
     """Returns what an open checkpoint records of its run.
 
     Raises WeightsError, or ValueError, which `open_h5` reports as damage: for a file that holds
     weights without a run; for settings that no run can have; and for a history, a replay buffer or
     layers that no run with these settings has.
     """
-    state = _read_state(file, path)
-    config = _read_config(state, path)
-    task, name = config.task, os.fsdecode(path)
-    recorded = read_info(file.attributes.get(GROUP, {}), name).task
+    state = _read_state(file)
+    config = _read_config(state, file.path)
+    task = config.task
+    recorded = read_info(file.attributes.get(GROUP, {}), file.path).task
     if recorded not in (None, task):
         raise ValueError(f"its weights belong to {recorded.name}, its settings to {task.name}")
-    layers = read_layers(file, name, task.observation_size, None)
+    layers = read_layers(file, task.observation_size, None)
     widths = [layer.bias.shape[0] for layer in layers]
     expected = [*config.hidden_units, task.action_count(config.torque_count)]
     if widths != expected:
@@ -89,23 +89,24 @@ def read_run(file: H5File, path: str | os.PathLike[str]) -> RecordedRun:
     return RecordedRun(config, history, _read_replay(file, config, steps), layers, state)
 
 
-def _read_state(file: H5File, path: str | os.PathLike[str]) -> dict[str, Any]:
+def _read_state(file: H5File) -> dict[str, Any]:
     """Returns the JSON of a checkpoint. Raises WeightsError for weights without a run."""
     if "run" not in file:
         raise WeightsError(
-            f"{path}: holds weights without a run to resume; use --init to start a run from them"
+            f"{file.path}: holds weights without a run to resume; use --init to start a run from "
+            "them"
         )
     size = math.prod(file.shapes.get("run/state", ()))
     if size > _LARGEST_STATE:
         raise WeightsError(
-            f"{os.fsdecode(path)}: its run/state has {size} bytes; expected at most "
-            f"{_LARGEST_STATE}: the file is not a checkpoint of a run"
+            f"{file.path}: its run/state has {size} bytes; expected at most {_LARGEST_STATE}: "
+            "the file is not a checkpoint of a run"
         )
     state: dict[str, Any] = json.loads(file.read("run/state").tobytes())
     return state
 
 
-def _read_config(state: dict[str, Any], path: str | os.PathLike[str]) -> Config:
+def _read_config(state: dict[str, Any], path: str) -> Config:
     """Returns the settings in the JSON of a checkpoint.
 
     Raises WeightsError for those of an older version, and for others that no run can have.
@@ -125,7 +126,7 @@ def _read_config(state: dict[str, Any], path: str | os.PathLike[str]) -> Config:
 
 def read_arrays(file: H5File, group: str) -> Iterator[tuple[str, NDArray[Any]]]:
     """Yields the arrays of a group, by name."""
-    for name in file:
+    for name in file.shapes:
         if name.startswith(f"{group}/"):
             yield name.removeprefix(f"{group}/"), file.read(name)
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import math
 import os
@@ -16,6 +17,7 @@ from functools import partial
 from pathlib import Path
 
 from keras_pendulum.config.config import Config
+from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.errors import UserError
 from keras_pendulum.history import EpisodeRecord, csv_header
@@ -23,7 +25,6 @@ from keras_pendulum.storage.atomic_write import retry_while_open, write_atomical
 from keras_pendulum.storage.find_weights import checkpoints_in
 from keras_pendulum.storage.folder_lock import lock_folder
 from keras_pendulum.storage.small_files import read_small_file, require_folder, require_regular
-from keras_pendulum.storage.snapshots import snapshots_file
 
 
 class RunFolder:
@@ -43,13 +44,9 @@ class RunFolder:
         self.path = Path(path)
         # The real path: a link that changes during the run must not change the folder.
         self._real_path = Path(os.path.realpath(path))
-        checkpoints = [self._real_path / task.weights_name for task in TASKS.values()]
-        self.weights = self._real_path / TASKS[environment].weights_name
-        self.best = _best_file(self.weights)
-        self.snapshots = snapshots_file(self.weights)
-        others = [file for file in checkpoints if file != self.weights]
-        # Of a run in another environment.
-        self._others = [*others, *map(_best_file, others), *map(snapshots_file, others)]
+        networks = {name: _network_files(self._real_path, task) for name, task in TASKS.items()}
+        self.weights, self.best, self.snapshots = networks.pop(environment)
+        self._others = [*itertools.chain(*networks.values())]  # of a run in another environment
         self.history = self._real_path / "history.csv"
         self.config = self._real_path / "config.json"
         self.picture = self._real_path / "rewards.png"
@@ -211,9 +208,10 @@ def find_run_if_folder(path: object) -> RunFolder | None:
     return find_run(path) if is_folder else None  # type: ignore[arg-type]
 
 
-def _best_file(weights: Path) -> Path:
-    """Returns the file of the best weights beside a checkpoint: `pendulum_weight_best.h5`."""
-    return weights.with_name(f"{weights.stem}_best{weights.suffix}")
+def _network_files(folder: Path, task: type[Task]) -> list[Path]:
+    """Returns the checkpoint, such as `pendulum_weight.h5`, and `…_best.h5`, `…_snapshots.h5`."""
+    file = folder / task.weights_name
+    return [file, *(file.with_stem(f"{file.stem}_{kind}") for kind in ("best", "snapshots"))]
 
 
 def _remove(*files: Path) -> None:

@@ -45,7 +45,7 @@ def save_weights(
     require_type("path", path, (str, os.PathLike))
     if Path(path).suffix.lower() == ".keras":
         raise UserError(f"{path}: this writes HDF5, not a .keras file; name it FILE.h5")
-    content = encode_weights(network, network.get_weights(), evaluated_return=evaluated_return)
+    content = encode_weights(network, evaluated_return=evaluated_return)
 
     def read_back(file: Path) -> None:
         try:
@@ -58,22 +58,18 @@ def save_weights(
 
 
 def encode_weights(
-    network: DQN,
-    weights: list[NDArray[np.float32]],
-    *,
-    evaluated_return: float | None = None,
-    **groups: dict[str, NDArray[Any]],
+    network: DQN, *, evaluated_return: float | None = None, **groups: dict[str, NDArray[Any]]
 ) -> bytes:
     """Returns the network's `.h5` file without its checksum.
 
     Args:
-        network: the network, for its activation and metadata.
-        weights: its weights, as `get_weights` returns them.
+        network: the network.
         evaluated_return: see `save_weights`.
         groups: further groups of arrays, by name.
 
     Raises UserError when a weight is not finite, or too large to be loaded.
     """
+    weights = network.get_weights()
     require_finite(weights, LARGEST_WEIGHT)
     values = {
         "version": __version__,

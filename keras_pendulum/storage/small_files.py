@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from keras_pendulum.errors import UserError
@@ -31,26 +32,22 @@ def read_small_file(path: Path) -> bytes:
 
 def require_regular(*files: Path) -> None:
     """Raises UserError for a link, a folder or a device in place of a file; it may be missing."""
-    for file in files:
-        mode = _mode(file)
-        if mode is not None and not stat.S_ISREG(mode):
-            raise _not_regular(file, "file")
+    _require(files, stat.S_ISREG, "file")
 
 
 def require_folder(*folders: Path) -> None:
     """Raises UserError for a link, a file or a device in place of a folder; it may be missing."""
-    for folder in folders:
-        mode = _mode(folder)
-        if mode is not None and not stat.S_ISDIR(mode):
-            raise _not_regular(folder, "folder")
+    _require(folders, stat.S_ISDIR, "folder")
 
 
-def _mode(path: Path) -> int | None:
-    """Returns the kind of what is at the path itself, also of a link; None where nothing is."""
-    try:
-        return path.lstat().st_mode
-    except (FileNotFoundError, NotADirectoryError):  # the folder does not exist either
-        return None
+def _require(paths: Iterable[Path], is_right: Callable[[int], bool], expected: str) -> None:
+    for path in paths:
+        try:
+            mode = path.lstat().st_mode  # of a link itself
+        except (FileNotFoundError, NotADirectoryError):  # the folder does not exist either
+            continue
+        if not is_right(mode):
+            raise _not_regular(path, expected)
 
 
 def _not_regular(path: Path, expected: str) -> UserError:

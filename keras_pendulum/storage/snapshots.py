@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,11 +39,6 @@ def take_snapshot(network: DQN, history: Sequence[EpisodeRecord]) -> Snapshot:
     return Snapshot(len(history), reward, np.clip(flat, -_LARGEST, _LARGEST).astype(np.float16))
 
 
-def snapshots_file(checkpoint: Path) -> Path:
-    """Returns the file of the snapshots beside a checkpoint: `pendulum_weight_snapshots.h5`."""
-    return checkpoint.with_name(f"{checkpoint.stem}_snapshots{checkpoint.suffix}")
-
-
 def encode_snapshots(network: DQN, snapshots: Sequence[Snapshot]) -> bytes:
     """Returns the file without its checksum; `network` is the newest one."""
     arrays: dict[str, NDArray[Any]] = {
@@ -52,7 +46,7 @@ def encode_snapshots(network: DQN, snapshots: Sequence[Snapshot]) -> bytes:
         "average_reward": np.array([each.average_reward for each in snapshots], np.float64),
         "weights": np.stack([each.weights for each in snapshots]),
     }
-    return encode_weights(network, network.get_weights(), snapshots=arrays)
+    return encode_weights(network, snapshots=arrays)
 
 
 def read_snapshots(

@@ -96,7 +96,6 @@ def _encode(run: Run) -> bytes:
     }
     return encode_weights(
         online,
-        online.get_weights(),
         target=_dataset_names(agent["target"]),
         optimizer=_dataset_names(agent["optimizer"]),
         replay=replay,
@@ -119,7 +118,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
         ConfigError: `config` belongs to another run.
     """
     with open_h5(path) as file:
-        recorded = read_run(file, path)
+        recorded = read_run(file)
         for name, old in recorded.config.learning().items():
             new = getattr(config, name)
             if new != old and name != "episodes":

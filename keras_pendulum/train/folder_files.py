@@ -162,8 +162,7 @@ class BestWeightsFile(Listener):
                 "episode": np.array(record.episode, np.int64),
                 "regret": np.array(record.greedy_regret, np.float64),
             }
-            online = self._run.agent.online
-            content = encode_weights(online, online.get_weights(), evaluation=evaluation)
+            content = encode_weights(self._run.agent.online, evaluation=evaluation)
             self._writer.write(self._path, content)
             self._regret = record.greedy_regret
 

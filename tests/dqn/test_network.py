@@ -12,6 +12,7 @@ import keras
 import numpy as np
 import pytest
 import tensorflow as tf
+from small_agents import assert_weights
 
 import keras_pendulum as kp
 from keras_pendulum.dqn.network import DQN
@@ -90,11 +91,9 @@ def test_clone_has_equal_weights_and_its_own_variables() -> None:
     assert (clone.hidden_units, clone.action_count, clone.observation_size) == ((8, 4), 2, 4)
     assert (clone.activation, clone.metadata) == ("relu", metadata)
     before = network.get_weights()
-    for ours, theirs in zip(clone.get_weights(), before, strict=True):
-        np.testing.assert_array_equal(ours, theirs)
+    assert_weights(clone.get_weights(), before)
     clone.set_weights([weights + 1 for weights in before])
-    for ours, theirs in zip(network.get_weights(), before, strict=True):
-        np.testing.assert_array_equal(ours, theirs)
+    assert_weights(network.get_weights(), before)
 
 
 def test_network_computes_in_float32_whatever_the_users_keras_computes_in() -> None:
@@ -107,10 +106,6 @@ def test_network_computes_in_float32_whatever_the_users_keras_computes_in() -> N
         keras.config.set_dtype_policy("float32")
     assert {weights.dtype for weights in network.get_weights()} == {np.dtype(np.float32)}
     assert network(np.zeros((1, 3), np.float32)).dtype == "float32"
-
-
-def test_network_has_no_metadata_by_default() -> None:
-    assert DQN((8,)).metadata == {}
 
 
 def saved_and_loaded(network: DQN, folder: Path) -> Any:

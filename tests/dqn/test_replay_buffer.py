@@ -69,17 +69,16 @@ def test_sample_is_a_copy() -> None:
     np.testing.assert_array_equal(batches.action, before)
 
 
-@pytest.mark.parametrize(("capacity", "count"), [(10, 0), (10, 4), (4, 11)])
-def test_batch_larger_than_the_stored_transitions_is_refused(capacity: int, count: int) -> None:
+@pytest.mark.parametrize(("capacity", "count"), [(10, 4), (4, 4), (4, 11)])
+def test_batch_has_at_most_all_stored_transitions(capacity: int, count: int) -> None:
     replay = filled(capacity, count)
-    with pytest.raises(ValueError, match="larger than population"):
-        replay.sample(5, random.Random(0))
-
-
-@pytest.mark.parametrize(("capacity", "count", "stored"), [(10, 4, 4), (4, 4, 4), (4, 11, 4)])
-def test_batch_of_all_stored_transitions_is_drawn(capacity: int, count: int, stored: int) -> None:
-    batch = filled(capacity, count).sample(stored, random.Random(0))
+    stored = min(capacity, count)
+    batch = replay.sample(stored, random.Random(0))
     assert sorted(batch.action[0].tolist()) == list(range(count - stored, count))
+    with pytest.raises(ValueError, match="larger than population"):
+        replay.sample(stored + 1, random.Random(0))
+    with pytest.raises(ValueError, match="larger than population"):
+        filled(capacity, 0).sample(1, random.Random(0))
 
 
 @pytest.mark.parametrize("count", [0, 3, 4, 5, 11])

@@ -15,8 +15,6 @@ import torch
 from conftest import Command
 
 import keras_pendulum as kp
-from keras_pendulum.environments.cartpole import CartPole
-from keras_pendulum.evaluate.score import Score
 
 CARTPOLE = "CartPole-v1"
 
@@ -175,12 +173,6 @@ def test_pole_that_never_fell_is_not_mentioned() -> None:
     score = kp.evaluate_policy("cartpole", 3)
     assert score.falls == [] and "fallen" not in score.as_json()
     assert "fell" not in score.summary()
-
-
-def test_falls_need_the_paths_of_the_episodes() -> None:
-    score = Score(CartPole(), np.array([10.0, 500.0]), np.array([500.0, 500.0]), seeds=range(2))
-    assert (score.fallen, score.falls) == (1, [])
-    assert score.summary().endswith("The pole fell in 1 of 2 episodes")
 
 
 def test_command_takes_the_environment(in_process: Command, tmp_path: Path) -> None:

@@ -237,16 +237,6 @@ def test_arrays_and_records_are_told_apart(tmp_path: Path) -> None:
         named_policy(str(record))
 
 
-@pytest.mark.parametrize(
-    "method", ["act", "choose_action", "select_action", "get_action", "predict"]
-)
-@pytest.mark.parametrize("answer", [1.5, [1.5], np.array([[1.5]]), tf.constant([[1.5]])])
-def test_objects_answer_with_a_torque_of_any_shape(method: str, answer: Any) -> None:
-    agent = type("Agent", (), {method: lambda self, observation: answer})()
-    policy = kp.evaluate_policy(agent, episodes=1, gravity=1.0)
-    assert policy.regret > 100
-
-
 def test_long_path_leaves_the_code_whole(tmp_path: Path) -> None:
     path = tmp_path / ("long" * 40) / "net.pth"
     path.parent.mkdir()

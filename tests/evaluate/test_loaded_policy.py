@@ -61,19 +61,6 @@ def test_action_of_cartpole_is_an_index() -> None:
     assert type(policy(CARTPOLE[0])) is int
 
 
-def test_q_values_are_those_of_the_network() -> None:
-    network = kp.DQN((64, 32), activation="relu,linear")
-    policy = kp.load_policy(network)
-    expected = network(PENDULUM).numpy()
-    np.testing.assert_allclose(policy.q_values(PENDULUM), expected, atol=1e-6)
-    np.testing.assert_allclose(policy.q_values(PENDULUM[0]), expected[0], atol=1e-6)
-    # Stable-Baselines3 calls with a batch of one, and its returns must be those of evaluate_policy.
-    for observation in PENDULUM:
-        np.testing.assert_array_equal(
-            policy.q_values(observation[np.newaxis])[0], policy.q_values(observation)
-        )
-
-
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
 def test_lists_and_other_types_of_numbers_are_rounded_to_float32(
     call: Callable[[kp.Policy, Any], Any],

@@ -59,7 +59,7 @@ def write_sound(path: Path, layout: str) -> Path:
 def _sound(layout: str) -> bytes:
     if layout == "this package":
         dqn = kp.DQN((16, 8), 5)
-        return encode_weights(dqn, dqn.get_weights())  # with a checksum no change would be read
+        return encode_weights(dqn)  # with a checksum no change would be read
     with tempfile.TemporaryDirectory() as folder:
         suffix = {"whole model": ".h5", "Keras 3": ".weights.h5", "keras": ".keras"}[layout]
         path = Path(folder, f"a{suffix}")
@@ -358,7 +358,7 @@ CONFIGS: dict[str, bytes] = {
 
 
 def packed(change: Callable[[dict[str, bytes]], None]) -> Change:
-    """Returns a change of the members of a zip file, which is written compressed."""
+    """Returns a change of the members of a zip file."""
 
     def change_file(path: Path, layout: str) -> None:
         members = read_members(path)
@@ -374,9 +374,11 @@ def read_members(path: Path) -> dict[str, bytes]:
 
 
 def write_members(path: Path, members: dict[str, bytes]) -> None:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+    """Writes a zip file. As in files of Keras, only members of many MB are compressed."""
+    with zipfile.ZipFile(path, "w") as file:
         for name, content in members.items():
-            file.writestr(name, content)
+            kind = zipfile.ZIP_STORED if len(content) < 10**7 else zipfile.ZIP_DEFLATED
+            file.writestr(name, content, kind)
 
 
 def member(name: str, content: bytes) -> Change:
@@ -462,6 +464,10 @@ def add_activations(config: Any) -> None:
     config["config"]["layers"][2:2] = [linear] * 100_000
 
 
+def h5_as_keras(path: Path, layout: str) -> None:
+    path.write_bytes(read_members(path)["model.weights.h5"])
+
+
 BY_ZIP: dict[str, Change] = {
     "no config.json": removed("config.json"),
     "no metadata.json": removed("metadata.json"),
@@ -490,14 +496,8 @@ BY_ZIP: dict[str, Change] = {
     "data in another file": weights_of(BY_H5PY["data in another file"]),
     "990 links to 64 attributes": weights_of(opened(many_links_to_attributes)),
     **{name: member("config.json", text) for name, text in CONFIGS.items()},
+    "HDF5 in place of a zip file": h5_as_keras,
 }
-
-
-def h5_as_keras(path: Path, layout: str) -> None:
-    path.write_bytes(read_members(path)["model.weights.h5"])
-
-
-BY_ZIP["HDF5 in place of a zip file"] = h5_as_keras
 
 HOSTILE: dict[tuple[str, str], Change] = {
     **{

@@ -56,8 +56,3 @@ def test_load_weights_takes_a_path_or_a_shipped_name(
 def test_mistyped_name_gets_a_suggestion() -> None:
     with pytest.raises(kp.WeightsError, match=r"\(\.h5\); did you mean reference\?$"):
         kp.find_weights("refrence")
-
-
-def test_shipped_file_is_found_by_its_name_and_by_no_path() -> None:
-    with pytest.raises(kp.WeightsError, match="weights/reference: no such file"):
-        kp.find_weights("../weights/../weights/reference")

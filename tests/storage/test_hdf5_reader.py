@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -97,17 +98,15 @@ def test_arrays_as_large_as_the_file_are_accepted_and_one_byte_more_is_refused(
             contents(file, 99)
 
 
-def test_array_without_stored_numbers_is_refused(tmp_path: Path) -> None:
-    """HDF5 would return zeros."""
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},  # no stored numbers: HDF5 would return zeros
+        {"data": np.ones((2, 2)), "chunks": (2, 2)},  # its numbers may be behind a filter
+    ],
+)
+def test_array_that_is_not_plain_is_refused(options: dict[str, Any], tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        file.create_dataset("a", (2, 2), "f4")
-        with pytest.raises(kp.WeightsError, match=r"a .* is not a plain array"):
-            contents(file, 100)
-
-
-def test_array_in_chunks_is_refused(tmp_path: Path) -> None:
-    """Its numbers may be behind a filter, though they are as many as they should be."""
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file.create_dataset("a", data=np.ones((2, 2), "f4"), chunks=(2, 2))
+        file.create_dataset("a", (2, 2), "f4", **options)
         with pytest.raises(kp.WeightsError, match=r"a .* is not a plain array"):
             contents(file, 100)

@@ -12,12 +12,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.checksum import write_with_checksum
-from keras_pendulum.storage.snapshots import (
-    encode_snapshots,
-    read_snapshots,
-    snapshots_file,
-    take_snapshot,
-)
+from keras_pendulum.storage.snapshots import encode_snapshots, read_snapshots, take_snapshot
 
 pytestmark = pytest.mark.usefixtures("files_read_here")
 NETWORK = kp.DQN((4,), 2)
@@ -30,11 +25,6 @@ def path(tmp_path: Path) -> Path:
     snapshots = [take_snapshot(NETWORK, HISTORY[:count]) for count in (0, 2, 3)]
     write_with_checksum(tmp_path / "a.h5", encode_snapshots(NETWORK, snapshots))
     return tmp_path / "a.h5"
-
-
-def test_file_has_its_name_beside_the_checkpoint(tmp_path: Path) -> None:
-    file = snapshots_file(tmp_path / "pendulum_weight.h5")
-    assert file == tmp_path / "pendulum_weight_snapshots.h5"
 
 
 def test_snapshots_are_read_as_they_were_written(path: Path) -> None:

@@ -16,15 +16,13 @@ import pytest
 import tensorflow as tf
 
 import keras_pendulum as kp
-from keras_pendulum.storage.checksum import write_with_checksum
 from keras_pendulum.storage.keras_h5 import _split
-from keras_pendulum.storage.save_weights import encode_weights
 
 pytestmark = pytest.mark.usefixtures("files_read_here")
 OBSERVATIONS = np.random.RandomState(0).randn(20, 3).astype(np.float32)
 
 
-def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
+def network() -> kp.DQN:
     metadata = {
         "environment": "Pendulum-v1",
         "gravity": 2.5,
@@ -32,26 +30,21 @@ def network(hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> kp.DQN:
         "seed": 7,
         "config": '{"seed": 7}',
     }
-    return kp.DQN(hidden, actions, seed=3, metadata=metadata)
+    return kp.DQN((16, 8), 5, seed=3, metadata=metadata)
 
 
-def save_unchecked(network: kp.DQN, path: Path) -> None:
-    """Saves a network that `save_weights` may refuse."""
-    write_with_checksum(path, encode_weights(network, network.get_weights()))
+def dense_layers(keras_module: Any) -> list[Any]:
+    layers = [keras_module.layers.Dense(units, activation="tanh") for units in (16, 8)]
+    return [*layers, keras_module.layers.Dense(5)]
 
 
-def dense_layers(keras_module: Any, hidden: tuple[int, ...], actions: int) -> list[Any]:
-    layers = [keras_module.layers.Dense(units, activation="tanh") for units in hidden]
-    return [*layers, keras_module.layers.Dense(actions)]
-
-
-def subclassed(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
+def subclassed(keras_module: Any) -> Any:
     """Returns a subclassed model, as the original's, in either version of Keras."""
 
     class Model(keras_module.Model):
         def __init__(self) -> None:
             super().__init__()
-            self.all = dense_layers(keras_module, hidden, actions)
+            self.all = dense_layers(keras_module)
 
         def call(self, inputs: Any) -> Any:
             for layer in self.all:
@@ -63,10 +56,8 @@ def subclassed(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: in
     return model
 
 
-def sequential(keras_module: Any, hidden: tuple[int, ...] = (16, 8), actions: int = 5) -> Any:
-    return keras_module.Sequential(
-        [keras_module.Input((3,)), *dense_layers(keras_module, hidden, actions)]
-    )
+def sequential(keras_module: Any) -> Any:
+    return keras_module.Sequential([keras_module.Input((3,)), *dense_layers(keras_module)])
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +120,7 @@ def make_changed(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
     """Returns a function that writes a valid file and changes something in it."""
 
     def make(path: Path) -> None:
-        save_unchecked(network(), path)
+        kp.save_weights(network(), path)
         with h5py.File(path, "r+") as file:
             change(file)
 
