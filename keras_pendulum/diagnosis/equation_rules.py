@@ -23,6 +23,7 @@ _UNRELATED = 0.5  # error of the right equation
 _SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
 _RIGHT_VALUES = 0.9  # correlation with the exact values
 _FEW_STEPS = 0.25  # error of the rewards of a few steps; that of rewards of another size is larger
+_LIKE_FEW_STEPS = 0.1  # error of the rewards of a few steps that leaves no doubt
 _BY_CHANCE = 0.1  # correlation of advantages that have not been learned
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
 _DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
@@ -175,6 +176,11 @@ def not_converged(m: Measurement) -> Finding | None:
         f"the values satisfy {RIGHT} to {percent(m.right_agreement.error)}, and no other equation "
     )
     evidence += f"clearly better; correlation of the advantages {m.right_agreement.correlation:.2f}"
+    if m.task.never_terminates and m.finite:
+        few = few_steps(m)
+        if few.error < min(_LIKE_FEW_STEPS, 0.3 * m.right_agreement.error):
+            evidence += f"; the values are the rewards of {few.steps} steps to "
+            evidence += f"{percent(few.error)}, so few copies of the target network were made"
     return Finding("not-converged", evidence, f"{HEALTHY}; above 0.7")
 
 

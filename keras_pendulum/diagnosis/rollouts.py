@@ -64,7 +64,7 @@ def roll_out(
 class FewSteps(NamedTuple):
     """How well values are the rewards of a few steps, as those of a short training are."""
 
-    count: int  # of the steps that fit best
+    steps: int  # that fit best
     error: float  # standard deviation of the difference, as a share of the spread of Q
     rollouts: Rollouts
 

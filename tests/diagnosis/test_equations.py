@@ -187,6 +187,24 @@ def test_target_network_of_a_program_that_never_copies_it_is_named() -> None:
     assert "the values satisfy r + a number above 0 that the next state sets" in diagnosis.verdict
 
 
+@pytest.mark.parametrize("sweeps", [2, 3, 5, 8])
+@pytest.mark.parametrize("discount", [0.95, 0.98])
+def test_values_of_a_few_steps_are_not_those_of_a_lower_discount(
+    sweeps: int, discount: float
+) -> None:
+    """So are the values where the target network is copied seldom: once for each of the sweeps."""
+
+    def target(r: Any, following: Any, own: Any) -> Any:
+        return r + discount * following.max(axis=2)
+
+    diagnosis = diagnose(fixed_point(target, sweeps), discount=discount)
+    assert first(diagnosis) in ("not-converged", "no finding")
+    if diagnosis.findings:
+        assert f"the values are the rewards of {sweeps} steps to " in diagnosis.verdict
+    lower = diagnose(fixed_point(lambda r, n, own: r + 0.7 * n.max(axis=2)), discount=discount)
+    assert first(lower) == "other-discount"
+
+
 @pytest.mark.parametrize("sweeps", [5, 10, 20])
 def test_wrong_sign_of_the_rewards_is_named_before_the_values_have_converged(sweeps: int) -> None:
     assert first(diagnose(fixed_point(TARGETS["reward-sign"], sweeps))) == "reward-sign"
