@@ -89,6 +89,7 @@ TARGETS = (
         lambda b: b.reward - b.future * b.next_q.max(axis=2),
         "The target subtracts the next values, so a good next state makes a value worse.",
         "Add the next values: r + γ·max Q(s′, ·).",
+        largest_error=0.6,
         share=0.2,
     ),
     Equation(
