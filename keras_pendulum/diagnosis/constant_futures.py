@@ -13,7 +13,7 @@ import numpy as np
 from keras_pendulum.diagnosis.backup import Backup
 from keras_pendulum.diagnosis.equation import Equation
 from keras_pendulum.diagnosis.signals import Array, line_fit
-from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
+from keras_pendulum.diagnosis.target_equations import NEGATIVE_NEXT, ZERO_OTHERS
 
 
 def constant_futures(declared: Backup) -> Iterator[Equation]:
@@ -132,6 +132,14 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
         if name == "index-for-value":  # values that are nearly the same have large errors
             equation = replace(equation, largest_error=3.0, share=0.3)
         yield _highest_everywhere(equation) if name == "batch-max" else equation
+    # All values are r / (1 + γ): the future of a step is this, times -γ.
+    subtracted = -declared.discount / (1 + declared.discount) * size
+    yield replace(
+        NEGATIVE_NEXT,
+        target=lambda b: b.reward + subtracted,
+        largest_error=2.0,
+        offset=abs(mean / subtracted - 1) < 0.2 and spread < 0.12 * size,
+    )
     lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
     yield replace(
         ZERO_OTHERS,

@@ -33,6 +33,17 @@ ZERO_OTHERS = Equation(
     flat=np.inf,
 )
 
+NEGATIVE_NEXT = Equation(
+    "wrong-target",
+    "negative-next",
+    "r - γ·max Q(s′, ·)",
+    lambda b: b.reward - b.future * b.next_q.max(axis=2),
+    "The target subtracts the next values, so a good next state makes a value worse.",
+    "Add the next values: r + γ·max Q(s′, ·).",
+    largest_error=0.6,
+    share=0.2,
+)
+
 TARGETS = (
     Equation(
         "wrong-target",
@@ -82,16 +93,7 @@ TARGETS = (
         f"{_TAKE_MAXIMUM} gather with the stored action is for Q(s, a) alone.",
         share=0.25,
     ),
-    Equation(
-        "wrong-target",
-        "negative-next",
-        "r - γ·max Q(s′, ·)",
-        lambda b: b.reward - b.future * b.next_q.max(axis=2),
-        "The target subtracts the next values, so a good next state makes a value worse.",
-        "Add the next values: r + γ·max Q(s′, ·).",
-        largest_error=0.6,
-        share=0.2,
-    ),
+    NEGATIVE_NEXT,
     Equation(
         "wrong-target",
         "same-state",

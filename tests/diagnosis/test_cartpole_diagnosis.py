@@ -89,6 +89,7 @@ def first(values: Any, **options: Any) -> str:
         ("no-bootstrapping", lambda o: 1 + 0.001 * np.sin(o[:, :2])),
         ("wrong-loss (batch-broadcast)", lambda o: 9 + 0.001 * np.sin(o[:, :2])),
         ("wrong-target (batch-max or same-state)", constant_values(18.0)),
+        ("wrong-target (negative-next)", lambda o: 0.52 + 0.05 * np.sin(o[:, :2])),
         ("wrong-target (index-for-value)", constant_values(0.8)),
         ("wrong-target (frozen-target)", frozen_values(0.1, 0.05)),
         ("wrong-target (frozen-target)", frozen_values(0.0, 0.05)),
