@@ -10,6 +10,7 @@ import numpy as np
 from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.hidden_units import stuck_units
 from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.evaluate.q_policies import DQNPolicy
 
@@ -19,6 +20,7 @@ _LOWEST_MEAN_REWARD = -1.3 * np.pi**2
 _SAME_VALUES = 0.01  # spread of values that are the same in all states, as a share of their mean
 _BEYOND_REWARDS = 1000  # times the lowest possible value
 _STILL_FALLING = 0.5  # distance to the targets, as a share of the mean reward
+_LOGARITHMS = "exp of the values of each state has the sum 1"
 _AT_THE_BOUND = 0.3  # share of the outputs; a linear head has none there
 
 
@@ -54,6 +56,8 @@ def bounded_output(m: Measurement) -> Finding | None:
             "softmax",
             "the values of each state are from 0 to 1, and their sum is 1",
         )
+    elif _has_logarithms(outputs):
+        variant, evidence = "log-softmax", _LOGARITHMS
     elif low >= -1 and high <= 1 and at_minus_one > _AT_THE_BOUND:
         variant = "tanh"
         evidence = f"no value is below -1, and {at_minus_one:.0%} of them are there"
@@ -72,6 +76,11 @@ def bounded_output(m: Measurement) -> Finding | None:
     return Finding("bounded-output", evidence, "no bound", variant=variant, text=text)
 
 
+def _has_logarithms(outputs: Array) -> bool:
+    """Returns whether values [N, A] are logarithms of shares."""
+    return bool(outputs.max() <= 0 and np.abs(np.exp(outputs).sum(axis=1) - 1).max() < 1e-3)
+
+
 def _bounded_everywhere(m: Measurement) -> Finding | None:
     """Finds bounds where the values of the task are positive: far away, a linear head has none."""
     random = np.random.RandomState(0)
@@ -80,6 +89,8 @@ def _bounded_everywhere(m: Measurement) -> Finding | None:
     low, high = float(outputs.min()), float(outputs.max())
     if low >= 0 and np.abs(outputs.sum(axis=1) - 1).max() < 1e-3:
         variant, bounds = "softmax", "from 0 to 1, and their sum is 1"
+    elif _has_logarithms(outputs):
+        variant, bounds = "log-softmax", f"below 0, and {_LOGARITHMS}"
     elif np.ptp(outputs) < 1e-3 and 0.999 < high <= 1:
         variant, bounds = "tanh or sigmoid", "1, also far outside of the task"
     elif 0 <= low < 0.1 and 0.9 < high <= 1:

@@ -16,9 +16,10 @@ from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.stored_rewards import StoredRewards
 
-_BATCH = 512  # a larger set of transitions is not a batch
+_LEAST_BATCH, _BATCH = 32, 512  # another number of transitions is not a batch
 _SMALL_BUFFER = 6000
 _OTHER_EFFORT = 0.05  # N·m or N
+_BEYOND = 1.1  # times the observation; what is then no end is not near one
 _MOST_STEPS = 20  # of one transition
 
 
@@ -30,13 +31,33 @@ def stored_transitions(m: Measurement) -> Finding | None:
     rewards = StoredRewards.of(r, m.dynamics, m.efforts, m.reward_scale)
     if rewards.fit.correlation < -0.9:
         return Finding("reward-sign", "stored rewards are the negative of the exact ones", "equal")
-    finding = _many_ends(m, r) or _repeated_state(r)
+    finding = _constant_number(m, r) or _many_ends(m, r) or _repeated_state(r)
     if finding is None and m.motion.obeying() < 0.98:
         one_step = rewards.fit.correlation > 0.999 and abs(rewards.fit.slope - 1) < 0.01
         if _has_several_steps(r) and not one_step:
             return None  # right, but not to be compared with one step of the dynamics
         finding = _other_actions(m, r) or _other_efforts(m, r) or _other_motion(m)
     return finding or _missing_ends(m, r) or _other_rewards(m, r, rewards)
+
+
+def _constant_number(m: Measurement, r: RunRecord) -> Finding | None:
+    """Finds a number of the observation that is the same in all transitions."""
+    names, observation = m.task.observation_names, r.replay.observation
+    same = [name for name, column in zip(names, observation.T, strict=True) if not np.ptp(column)]
+    if not same:
+        return None
+    return Finding(
+        "observation-map",
+        f"{', '.join(same)} is the same number in all stored transitions",
+        "numbers that differ",
+        text=Fault(
+            "A part of the observation is lost before it is stored. So the network cannot learn "
+            "what depends on it.",
+            "Store the observation as the environment gives it, and print some of its rows.",
+            (*FAULTS["observation-map"].explains, "torque-map", "misaligned-transitions"),
+        ),
+        proven=True,
+    )
 
 
 def _has_several_steps(r: RunRecord) -> bool:
@@ -207,7 +228,7 @@ def _other_rewards(m: Measurement, r: RunRecord, rewards: StoredRewards) -> Find
     if residual > 0.02 and rewards.shifted_correlation > 0.9999:
         evidence = "stored rewards are those of the step before"
         return Finding("misaligned-transitions", evidence, "those of their own step")
-    if correlation < 0.98 and rewards.follow_states(m.dynamics.observation_sizes):
+    if correlation < 0.995 and rewards.follow_states(m.dynamics.observation_sizes):
         evidence = f"correlation of the recorded rewards with the exact ones {correlation:.2f}"
         return Finding("other-reward", evidence, "1.00")
     return None
@@ -221,7 +242,7 @@ def forgetting(m: Measurement) -> Finding | None:
     # An episode of CartPole is short until the pole is balanced.
     small = _SMALL_BUFFER if m.task.never_terminates else 1000
     stored = len(r.replay.action)
-    if 8 <= stored <= _BATCH and r.steps is None and r.follows.mean() > 0.9:
+    if _LEAST_BATCH <= stored <= _BATCH and r.steps is None and r.follows.mean() > 0.9:
         return Finding(
             "forgetting",
             f"{r.follows.mean():.0%} of the {stored} transitions follow each other",
@@ -245,7 +266,9 @@ def truncation_as_end(m: Measurement) -> Finding | None:
     """Finds stored ends where the task goes on."""
     if m.record is None:
         return None
-    share = (m.record.replay.terminated & ~_ended(m, m.record)).mean()
+    following = m.record.replay.next_observation
+    near = m.dynamics.are_over(m.dynamics.states_of(_BEYOND * following))  # units may be inexact
+    share = (m.record.replay.terminated & ~near).mean()
     if not share:
         return None
     evidence = f"{share:.1%} of the stored transitions are ends, and the task goes on there"

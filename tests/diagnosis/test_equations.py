@@ -320,6 +320,7 @@ def test_index_in_place_of_the_value_is_named() -> None:
     ("variant", "head"),
     [
         ("softmax", lambda q: np.exp(q) / np.exp(q).sum(axis=1, keepdims=True)),
+        ("log-softmax", lambda q: q - np.log(np.exp(q).sum(axis=1, keepdims=True))),
         ("tanh", np.tanh),
         ("sigmoid", lambda q: 1 / (1 + np.exp(-q))),
         ("relu", lambda q: np.maximum(q, 0)),

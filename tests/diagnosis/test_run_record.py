@@ -107,6 +107,17 @@ def test_rewards_and_states_of_several_steps_are_no_fault(record: RunRecord, ste
     assert found[0].name == "misaligned-transitions"
 
 
+def without_number(record: RunRecord, place: int) -> RunRecord:
+    """Returns a record with one number of all observations stored as 0."""
+    keep = (np.arange(3) != place).astype(np.float32)
+    replay = record.replay
+    return changed(
+        record,
+        observation=replay.observation * keep,
+        next_observation=replay.next_observation * keep,
+    )
+
+
 @pytest.mark.parametrize(
     ("fault", "change"),
     [
@@ -117,6 +128,7 @@ def test_rewards_and_states_of_several_steps_are_no_fault(record: RunRecord, ste
         ("misaligned-transitions", lambda r: before(r, "next_observation")),
         ("misaligned-transitions", lambda r: before(r, "reward")),
         ("untrained-outputs", lambda r: selected(r, r.replay.action != 7)),
+        ("observation-map", lambda r: without_number(r, 2)),
         ("exploration", lambda r: trained(r, 1.0)),
         ("forgetting", lambda r: trained(selected(r, slice(-1000, None)), 0.8)),
     ],
