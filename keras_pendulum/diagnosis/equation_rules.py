@@ -15,7 +15,7 @@ from keras_pendulum.diagnosis.backup import Agreement
 from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.measurement import Measurement
-from keras_pendulum.diagnosis.rollouts import few_steps
+from keras_pendulum.diagnosis.rollouts import FewSteps, few_steps
 
 RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _GROWN = 3.0  # spreads above the best possible value
@@ -72,11 +72,15 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         actions = comparisons.match_actions(m)
         return actions is not None and actions.declared > comparisons.SAME_ACTIONS
 
+    @cache
+    def short_training() -> FewSteps:
+        return few_steps(m)
+
     def is_short_training(equation: Equation) -> bool:
         """Returns whether values of the declared task that look few steps ahead fit better."""
         if not m.task.never_terminates:
             return False
-        few = few_steps(m)
+        few = short_training()
         if equation.slope is not None:
             return few.error < _FEW_STEPS
         if equation.discount is None or equation.discount > m.discount:

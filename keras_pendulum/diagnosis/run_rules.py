@@ -11,7 +11,7 @@ from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.played_steps import PARTS
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.diagnosis.transition_rules import OLD_STATE
+from keras_pendulum.diagnosis.stored_states import OLD_STATE
 
 _LONG_RUN = 4000  # steps: 20 episodes of the pendulum
 

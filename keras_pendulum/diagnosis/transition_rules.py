@@ -15,12 +15,16 @@ from keras_pendulum.diagnosis.motion import FEW
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.stored_rewards import StoredRewards
+from keras_pendulum.diagnosis.stored_states import (
+    constant_number,
+    has_several_steps,
+    repeated_state,
+)
 
 _LEAST_BATCH, _BATCH = 32, 512  # another number of transitions is not a batch
 _SMALL_BUFFER = 6000
 _OTHER_EFFORT = 0.05  # N·m or N
 _BEYOND = 1.1  # times the observation; what is then no end is not near one
-_MOST_STEPS = 20  # of one transition
 
 
 def stored_transitions(m: Measurement) -> Finding | None:
@@ -31,42 +35,13 @@ def stored_transitions(m: Measurement) -> Finding | None:
     rewards = StoredRewards.of(r, m.dynamics, m.efforts, m.reward_scale)
     if rewards.fit.correlation < -0.9:
         return Finding("reward-sign", "stored rewards are the negative of the exact ones", "equal")
-    finding = _constant_number(m, r) or _many_ends(m, r) or _repeated_state(r)
+    finding = constant_number(m, r) or _many_ends(m, r) or repeated_state(r)
     if finding is None and m.motion.obeying() < 0.98:
         one_step = rewards.fit.correlation > 0.999 and abs(rewards.fit.slope - 1) < 0.01
-        if _has_several_steps(r) and not one_step:
+        if has_several_steps(r) and not one_step:
             return None  # right, but not to be compared with one step of the dynamics
         finding = _other_actions(m, r) or _other_efforts(m, r) or _other_motion(m)
     return finding or _missing_ends(m, r) or _other_rewards(m, r, rewards)
-
-
-def _constant_number(m: Measurement, r: RunRecord) -> Finding | None:
-    """Finds a number of the observation that is the same in all transitions."""
-    names, observation = m.task.observation_names, r.replay.observation
-    same = [name for name, column in zip(names, observation.T, strict=True) if not np.ptp(column)]
-    if not same:
-        return None
-    return Finding(
-        "observation-map",
-        f"{', '.join(same)} is the same number in all stored transitions",
-        "numbers that differ",
-        text=Fault(
-            "A part of the observation is lost before it is stored. So the network cannot learn "
-            "what depends on it.",
-            "Store the observation as the environment gives it, and print some of its rows.",
-            (*FAULTS["observation-map"].explains, "torque-map", "misaligned-transitions"),
-        ),
-        proven=True,
-    )
-
-
-def _has_several_steps(r: RunRecord) -> bool:
-    """Returns whether the next state of a transition is the state a few rows later."""
-    observation, following = r.replay.observation, r.replay.next_observation
-    return any(
-        np.all(following[:-steps] == observation[steps:], axis=1).mean() > 0.5
-        for steps in range(2, _MOST_STEPS + 1)
-    )
 
 
 def _many_ends(m: Measurement, r: RunRecord) -> Finding | None:
@@ -110,43 +85,6 @@ def _other_motion(m: Measurement) -> Finding | None:
         evidence = f"stored transitions of a pendulum with g = {gravity:.2f}"
         return Finding("other-gravity", evidence, f"{own:.2f}")
     return None
-
-
-def _repeated_state(r: RunRecord) -> Finding | None:
-    """Finds a state that is not updated."""
-    replay = r.replay
-    unmoved = np.mean(np.all(replay.observation == replay.next_observation, axis=1))
-    if unmoved > 0.5:
-        return Finding(
-            "misaligned-transitions",
-            f"in {unmoved:.0%} of the stored transitions the next state is the state",
-            "none",
-            variant="same-state",
-            text=Fault(
-                "The next state is stored as the state itself, so no action has a consequence.",
-                "Store (s, a, r, s′) before s = s′, and copy the observation where the environment "
-                "changes it in place.",
-                ("too-few-updates", "wrong-target"),
-            ),
-        )
-    repeated = np.mean(np.all(replay.observation[1:] == replay.observation[:-1], axis=1))
-    if repeated > 0.5:
-        return Finding(
-            "misaligned-transitions",
-            f"{repeated:.0%} of the stored transitions begin with the state of the one before",
-            "none",
-            variant="same-state",
-            text=OLD_STATE,
-        )
-    return None
-
-
-OLD_STATE = Fault(
-    "The state is not updated: each action of an episode is chosen at its first state. So the "
-    "network sees one state of each episode.",
-    "Set the state to the next state at the end of each step.",
-    ("too-few-updates", "narrow-starts", "torque-map", "observation-map"),
-)
 
 
 def _other_actions(m: Measurement, r: RunRecord) -> Finding | None:

@@ -1,0 +1,76 @@
+"""What the stored states of a run show without the dynamics of the task."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from keras_pendulum.diagnosis.faults import FAULTS, Fault, Finding
+from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.run_record import RunRecord
+
+_MOST_STEPS = 20  # of one transition
+
+OLD_STATE = Fault(
+    "The state is not updated: each action of an episode is chosen at its first state. So the "
+    "network sees one state of each episode.",
+    "Set the state to the next state at the end of each step.",
+    ("too-few-updates", "narrow-starts", "torque-map", "observation-map"),
+)
+
+
+def constant_number(m: Measurement, r: RunRecord) -> Finding | None:
+    """Finds a number of the observation that is the same in all transitions."""
+    names, observation = m.task.observation_names, r.replay.observation
+    same = [name for name, column in zip(names, observation.T, strict=True) if not np.ptp(column)]
+    if not same:
+        return None
+    return Finding(
+        "observation-map",
+        f"{', '.join(same)} is the same number in all stored transitions",
+        "numbers that differ",
+        text=Fault(
+            "A part of the observation is lost before it is stored. So the network cannot learn "
+            "what depends on it.",
+            "Store the observation as the environment gives it, and print some of its rows.",
+            (*FAULTS["observation-map"].explains, "torque-map", "misaligned-transitions"),
+        ),
+        proven=True,
+    )
+
+
+def repeated_state(r: RunRecord) -> Finding | None:
+    """Finds a state that is not updated."""
+    replay = r.replay
+    unmoved = np.mean(np.all(replay.observation == replay.next_observation, axis=1))
+    if unmoved > 0.5:
+        return Finding(
+            "misaligned-transitions",
+            f"in {unmoved:.0%} of the stored transitions the next state is the state",
+            "none",
+            variant="same-state",
+            text=Fault(
+                "The next state is stored as the state itself, so no action has a consequence.",
+                "Store (s, a, r, s′) before s = s′, and copy the observation where the environment "
+                "changes it in place.",
+                ("too-few-updates", "wrong-target"),
+            ),
+        )
+    repeated = np.mean(np.all(replay.observation[1:] == replay.observation[:-1], axis=1))
+    if repeated > 0.5:
+        return Finding(
+            "misaligned-transitions",
+            f"{repeated:.0%} of the stored transitions begin with the state of the one before",
+            "none",
+            variant="same-state",
+            text=OLD_STATE,
+        )
+    return None
+
+
+def has_several_steps(r: RunRecord) -> bool:
+    """Returns whether the next state of a transition is the state a few rows later."""
+    observation, following = r.replay.observation, r.replay.next_observation
+    return any(
+        np.all(following[:-steps] == observation[steps:], axis=1).mean() > 0.5
+        for steps in range(2, _MOST_STEPS + 1)
+    )
