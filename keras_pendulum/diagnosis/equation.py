@@ -72,8 +72,8 @@ class Equation:
     def _explains_ends(self, own: Agreement, right: Agreement) -> bool:
         """Returns the same for a task whose episodes terminate: its values show more."""
         error, share, correlation = _LIMITS_WITH_ENDS.get(self.name, (0.2, 0.5, 0.8))
-        if self.variant and self.share < share:
-            error, share = self.largest_error, self.share
+        if self.variant:
+            share = min(share, self.share)
         if own.error > min(error, share * right.error) or own.correlation < correlation:
             return False
         if self.name == "missing-end":

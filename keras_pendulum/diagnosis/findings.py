@@ -55,19 +55,27 @@ _SHOWN_BY_REPAIR = ("torque-map", "observation-map")  # unless stored actions pr
 def find(measurement: Measurement) -> list[Finding]:
     """Returns the findings of all rules, each name once.
 
-    What another finding explains is left out. So is a finding whose repair does not win half of
-    the avoidable regret, where only the repair shows it; others lose the repair.
+    What another finding explains is left out, unless the transitions prove it. So is a finding
+    whose repair does not win half of the avoidable regret, where only the repair shows it; others
+    lose the repair.
     """
     found: dict[str, Finding] = {}
+    proof = ""  # the name of what the transitions prove
     for rule in RULES:
         finding = _with_working_repair(measurement, rule(measurement))
         if finding is not None:
             found.setdefault(finding.name, finding)
+            if rule is transition_rules.stored_transitions:
+                proof = finding.name
             if not measurement.finite:
                 break
     for name, fault in FAULTS.items():
         if name in found:
-            found = {other: each for other, each in found.items() if other not in fault.explains}
+            found = {
+                other: each
+                for other, each in found.items()
+                if other not in fault.explains or other == proof
+            }
     if not found:
         finding = run_rules.unsteady_return(measurement)
         if finding := finding or equation_rules.not_converged(measurement):
