@@ -81,7 +81,7 @@ class Backup(NamedTuple):
 
     @property
     def offset_by_next_state(self) -> Array:
-        """What a polynomial of the next observation explains of `offset`, for the pendulum, [M]."""
+        """The part of `offset` [M] that a polynomial of the pendulum's next observation gives."""
         cosine, sine, speed = self.next_observation[self.continues.ravel()].astype(float).T
         speed = speed / MAX_SPEED
         powers = [(i, j) for i in range(6) for j in range(6 - i)]

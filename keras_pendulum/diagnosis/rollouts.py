@@ -1,4 +1,4 @@
-"""Steps of a policy after one action: what the values of several steps should be.
+"""Steps of a policy after one action, and the values that they should have.
 
 Over one step, the sides of a wrong equation may differ little. Over more steps, the difference
 grows, and the network's own errors do not.
@@ -62,7 +62,7 @@ def roll_out(
 
 
 class FewSteps(NamedTuple):
-    """How well values are the rewards of a few steps, as those of a short training are."""
+    """The agreement of values with the rewards of a few steps; a short training has it."""
 
     steps: int  # that fit best
     error: float  # standard deviation of the difference, as a share of the spread of Q

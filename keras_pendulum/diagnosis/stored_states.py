@@ -1,4 +1,4 @@
-"""What the stored states of a run show without the dynamics of the task."""
+"""Mistakes that the stored states of a run show without the dynamics of the task."""
 
 from __future__ import annotations
 
