@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.diagnosis.transition_rules import truncation_as_end
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.optimum.cartpole import CartPoleSolution
 from keras_pendulum.optimum.cartpole_dynamics import has_fallen, step_forces
@@ -134,6 +135,13 @@ def test_transitions_show_the_mistake(finding: str, change: Any) -> None:
 
     assert finding in first(useless, transitions=change(*transitions()))
     assert finding not in first(useless, transitions=transitions())
+
+
+def test_end_in_inexact_units_is_no_truncation() -> None:
+    s, a, r, following, ended = transitions()
+    scaled = [0.95 * s, a, r, 0.95 * following, ended]
+    diagnosis = kp.diagnose("cartpole", transitions=scaled)
+    assert truncation_as_end(diagnosis.measurement) is None
 
 
 def test_penalty_for_the_fall_is_no_fault() -> None:

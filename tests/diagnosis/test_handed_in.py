@@ -229,6 +229,10 @@ def test_transitions_show_the_mistake(finding: str, change: Any, run: Any) -> No
     assert first(None, change(run)) == finding
 
 
+def test_ten_transitions_are_no_batch(run: Any) -> None:
+    assert not first(None, [each[-10:] for each in buffer_of(run)]).startswith("forgetting")
+
+
 def test_constant_that_is_added_to_the_stored_rewards_is_named(run: Any) -> None:
     measured = measure(
         bad_values,
