@@ -7,8 +7,7 @@ docs/why_the_original_does_not_learn.md explains why.
 
 Network, replay buffer, training loop and update are those of the final listing. Added are the seeds
 and the initial weights of a recorded run, so that the program prints the lines of that run. Later
-lines depend on floating-point rounding; these environment variables give the recorded rounding:
-TF_NUM_INTRAOP_THREADS=1 TF_ENABLE_ONEDNN_OPTS=0 ONEDNN_MAX_CPU_ISA=AVX2.
+lines depend on floating-point rounding: some processors choose another action in episode 294.
 """
 
 from __future__ import annotations

@@ -27,10 +27,14 @@ _ENVIRONMENT = {
     "TF_CPP_MIN_LOG_LEVEL": "3",  # no start-up notes
 }
 if sysconfig.get_platform().endswith(("x86_64", "amd64")):
-    # So do XLA, and the kernel of TensorFlow's matrix products, which is oneDNN's even so. Without
-    # fused multiply-add (after AVX), the final weights are nearer to those of the recorded runs.
-    _ENVIRONMENT["XLA_FLAGS"] = "--xla_cpu_max_isa=AVX"
-    _ENVIRONMENT["ONEDNN_MAX_CPU_ISA"] = "AVX2"
+    # Gradients are products of a kernel of oneDNN even so. It adds up the last rows of a block in
+    # another order, and the blocks depend on the processor's cache. Eigen's kernel is as fast.
+    _ENVIRONMENT["TENSORFLOW_USE_CUSTOM_CONTRACTION_KERNEL"] = "0"
+    # XLA compiles for the processor. Without fused multiply-add (after AVX) its code rounds alike
+    # everywhere, and without unrolled loops as that of the recorded runs.
+    _ENVIRONMENT["XLA_FLAGS"] = (
+        "--xla_cpu_max_isa=AVX --xla_backend_extra_options=xla_cpu_disable_loop_unrolling"
+    )
 if sys.platform == "linux":
     # By default SDL shows its pictures with OpenGL, whose driver may load an LLVM that crashes
     # together with TensorFlow's. SDL reads the variable when it makes its first window.
@@ -42,7 +46,7 @@ if sys.platform == "linux":
 # A line of the C++ library absl, such as "I0000 00:00:1795466974.767995    4604 port.cc:153] …".
 _NOTE = re.compile(rb"WARNING: All log messages before absl::|[IWE]\d+ [\d:.]+ +\d+ [^ ]+:\d+\] ")
 # TensorFlow reads these when it is imported, or at its first product.
-_OF_TENSORFLOW = ("TF_", "XLA_", "ONEDNN_")
+_OF_TENSORFLOW = ("TF_", "XLA_", "TENSORFLOW_")
 _ROUNDING = [
     name
     for name in _ENVIRONMENT

@@ -71,7 +71,7 @@ def repeat(preset: str) -> Row:
     identical = 0  # counts up to the first episode with a difference
     for record in train_episodes(run):
         steps = slice(record.environment_steps - STEPS, record.environment_steps)
-        identical += (
+        identical += bool(
             identical == record.episode
             and record.line() == lines[record.episode]
             and record.average_reward == recorded["average_reward"][record.episode]

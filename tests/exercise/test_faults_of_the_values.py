@@ -13,7 +13,8 @@ from keras_pendulum.exercise.program import exercise, program
 from keras_pendulum.exercise.table import CARTPOLE, EXERCISES, PENDULUM
 
 STEPS = 8_000
-LEARNED = (1, 3, 10, 11, 17, 20)
+# The mean and the maximum of the next values differ where the network has learned to act.
+LEARNED = {1: STEPS, 3: 20_000, 10: STEPS, 11: STEPS, 17: STEPS, 20: STEPS}
 
 
 def test_every_exercise_has_a_test() -> None:
@@ -23,7 +24,7 @@ def test_every_exercise_has_a_test() -> None:
 @pytest.mark.parametrize("number", LEARNED)
 def test_diagnosis_names_the_fault_first(number: int, tmp_path: Path) -> None:
     each = exercise(number)
-    result = result_of(program(number), each.environment, STEPS, tmp_path)
+    result = result_of(program(number), each.environment, LEARNED[number], tmp_path)
     assert result["findings"][0]["name"] == each.finding, result["verdict"]
     assert not answer(number, result)[0]
 

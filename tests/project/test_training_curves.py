@@ -63,8 +63,8 @@ def test_stored_curves_are_as_the_page_says() -> None:
         each["regret"] > 5 * healthy["regret"] for name, each in rows.items() if name != HEALTHY
     )
     assert healthy["loss"] < rows["no target network"]["loss"]
-    # The last updates of this run are large. Its loss is a mean of squares.
-    assert rows["small replay buffer"]["TD error"] < healthy["TD error"]
+    # Small, although the return is bad.
+    assert rows["small replay buffer"]["TD error"] < 0.5 * rows["no target network"]["TD error"]
     assert rows["ε stays at 1"]["mean Q"] > 0 > healthy["mean Q"]
     assert abs(rows["few updates"]["mean Q"]) < 20
 
