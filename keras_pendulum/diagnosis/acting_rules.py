@@ -9,8 +9,10 @@ import numpy as np
 
 from keras_pendulum.diagnosis import comparisons, repairs
 from keras_pendulum.diagnosis.comparisons import SAME_ACTIONS
-from keras_pendulum.diagnosis.faults import Finding
+from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
+
+_SMALL = 0.75  # of the largest torque that the pendulum takes
 
 
 def observation_map(m: Measurement) -> Finding | None:
@@ -73,3 +75,25 @@ def torque_map(m: Measurement) -> Finding | None:
             repairs.change_efforts(m, gain * m.efforts, f"torques times {gain:.2g}"),
         )
     return None
+
+
+def small_torques(m: Measurement) -> Finding | None:
+    """Finds torques that are all small, where the agent plays better with larger ones."""
+    largest, limit = np.abs(m.efforts).max(), m.dynamics.largest_effort
+    if not m.dynamics.any_effort or not 0 < largest < _SMALL * limit or not m.finite:
+        return None
+    factor = limit / largest
+    text = Fault(
+        f"The outputs stand for at most {largest:.2g} N·m, and the pendulum takes {limit:g}. With "
+        "larger torques the same values play better, so the network may have learned with them.",
+        f"Name the torques of the training with torques= (--torques), or multiply by {factor:.2g} "
+        "where the agent acts.",
+    )
+    repair = repairs.change_efforts(m, factor * m.efforts, f"torques times {factor:.2g}")
+    return Finding(
+        "torque-map",
+        f"with {repair.name} the regret is {repair.regret:.1f}",
+        "no change helps",
+        repair,
+        text=text,
+    )

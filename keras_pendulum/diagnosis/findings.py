@@ -36,6 +36,7 @@ RULES: tuple[Callable[[Measurement], Finding | None], ...] = (
     acting_rules.observation_map,
     output_rules.reward_size,
     acting_rules.torque_map,
+    acting_rules.small_torques,
     training_rules.untrained_outputs,
     training_rules.stored_rewards,
     training_rules.too_few_updates,

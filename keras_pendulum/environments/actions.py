@@ -98,7 +98,10 @@ def torque_actions(torques: ArrayLike | None, count: int | None = None) -> Torqu
     if array.dtype.kind not in "fiu" or array.ndim != 1:
         raise ConfigError(f"torques are {torques!r}; expected a list of numbers (N·m)")
     if not (np.abs(array) <= MAX_TORQUE + ROUNDING).all():  # written so that NaN fails too
-        raise ConfigError(f"torques are {torques!r}; expected numbers from -2 to 2 (N·m)")
+        least, largest = array.min(), array.max()
+        raise ConfigError(
+            f"torques are from {least:g} to {largest:g}; expected numbers from -2 to 2 (N·m)"
+        )
     if count is not None and len(array) != count:
         raise ConfigError(f"torques has {len(array)} numbers; the agent has {count} actions")
     return TorqueActions(array.astype(np.float64).clip(-MAX_TORQUE, MAX_TORQUE))

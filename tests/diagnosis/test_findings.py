@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import NOISE, diagnose_values, exact_values, measure
+from exact_agent import NOISE, TORQUES, diagnose_values, exact_values, measure
 
 from keras_pendulum.diagnosis.diagnose import diagnose_measurement
 from keras_pendulum.diagnosis.diagnosis import Diagnosis
 from keras_pendulum.diagnosis.faults import FAULTS
 from keras_pendulum.diagnosis.findings import find
+from keras_pendulum.environments.actions import TorqueActions
 
 
 def first(diagnosis: Diagnosis) -> str:
@@ -118,6 +119,20 @@ def test_repair_shows_what_a_reversed_torque_map_costs() -> None:
     finding = diagnose_values(lambda o: exact_values(o)[:, ::-1]).findings[0]
     assert finding.repair is not None and finding.cost is not None
     assert finding.repair.regret < 2 and finding.cost > 500
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_torques_that_are_all_small_are_named_where_larger_ones_play_better(share: float) -> None:
+    measured = measure(exact_values, share=share)
+    measured.policy.actions = TorqueActions(share * TORQUES)
+    diagnosis = diagnose_measurement(measured)
+    assert first(diagnosis) == "torque-map", diagnosis.verdict
+    assert f"at most {2 * share:g} N·m" in diagnosis.summary()
+    assert f"multiply by {1 / share:.2g}" in diagnosis.summary()
+    # Values of random weights play no better with larger torques.
+    measured = measure(lambda o: np.tanh(o @ NOISE), share=share)
+    measured.policy.actions = TorqueActions(share * TORQUES)
+    assert "torque-map" not in {finding.name for finding in find(measured)}
 
 
 def test_bare_policy_is_diagnosed_by_repairs() -> None:

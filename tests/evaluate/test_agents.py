@@ -197,6 +197,7 @@ def test_known_discount_is_that_of_the_run_or_of_stable_baselines3(network: kp.D
     [
         ([-2, 0, 2], "torques has 3 numbers; the agent has 5 actions"),
         ([-2, -1, 0, 1, np.nan], "expected numbers from -2 to 2"),
+        (np.linspace(-4, 4, 5), "torques are from -4 to 4; expected numbers from -2 to 2"),
         ([[0, 0, 0, 0, 0]], "expected a list of numbers"),
         ([1, [2, 3]], "expected a list of numbers"),
         ("abcde", "expected a list of numbers"),
