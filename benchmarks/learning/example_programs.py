@@ -10,7 +10,6 @@ Stable-Baselines3, if it has that library. It takes ten minutes.
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -65,12 +64,15 @@ def measured(name: str, runs: int, python: str) -> Row:
 
 def main(runs: str = "2", python: str = sys.executable) -> None:
     """Makes the runs and writes the table."""
-    has_sb3 = subprocess.run([python, "-c", "import stable_baselines3"], capture_output=True)
-    names = [name for name in PROGRAMS if name != "sb3_dqn.py" or has_sb3.returncode == 0]
+    installed = run_process("-m", "benchmarks.learning.other_libraries", python=python)
+    libraries = installed.output.splitlines()
+    has_sb3 = any(each.startswith("stable-baselines3 ") for each in libraries)
+    names = [name for name in PROGRAMS if name != "sb3_dqn.py" or has_sb3]
     rows = [
         measured(name, int(runs), python if "sb3" in name else sys.executable) for name in names
     ]
-    write("example_programs", f"python -m benchmarks.learning.example_programs {runs}", rows)
+    command = f"python -m benchmarks.learning.example_programs {runs}"
+    write("example_programs", command, rows, also=libraries)
 
 
 if __name__ == "__main__":
