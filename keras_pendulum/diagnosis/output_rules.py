@@ -87,15 +87,17 @@ def _bounded_everywhere(m: Measurement) -> Finding | None:
     far = random.normal(scale=1000, size=(200, m.task.observation_size)).astype(np.float32)
     outputs = np.concatenate([m.q_values(far), m.learned_q]) * m.reward_scale
     low, high = float(outputs.min()), float(outputs.max())
+    # Small values of hidden layers with tanh do not leave -1 to 1 either, but few are at a bound.
+    at_bound = np.mean(np.abs(outputs) > 0.99) > _AT_THE_BOUND
     if low >= 0 and np.abs(outputs.sum(axis=1) - 1).max() < 1e-3:
         variant, bounds = "softmax", "from 0 to 1, and their sum is 1"
     elif _has_logarithms(outputs):
         variant, bounds = "log-softmax", f"below 0, and {_LOGARITHMS}"
     elif np.ptp(outputs) < 1e-3 and 0.999 < high <= 1:
         variant, bounds = "tanh or sigmoid", "1, also far outside of the task"
-    elif 0 <= low < 0.1 and 0.9 < high <= 1:
+    elif 0 <= low < 0.1 and high <= 1 and at_bound:
         variant, bounds = "sigmoid", "from 0 to 1, also far outside of the task"
-    elif -1 <= low < 0 and 0.9 < high <= 1:
+    elif -1 <= low < 0 and high <= 1 and at_bound:
         variant, bounds = "tanh", "from -1 to 1, also far outside of the task"
     else:
         return None

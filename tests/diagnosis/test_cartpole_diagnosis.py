@@ -16,6 +16,7 @@ from keras_pendulum.optimum.cartpole_dynamics import has_fallen, step_forces
 EXACT = CartPoleSolution(CartPole())
 TABLE = EXACT.table(0.95)
 FORCES = np.array([-10.0, 10.0])
+WEIGHTS = np.array([[0.3, -0.4], [-0.5, 0.2], [2.0, 1.0], [0.7, -0.9]])  # of a hidden layer
 
 
 def exact_values(observations: Any) -> Any:
@@ -103,6 +104,19 @@ def first(values: Any, **options: Any) -> str:
 )
 def test_changed_values_are_named(finding: str, values: Any) -> None:
     assert first(values) == finding
+
+
+@pytest.mark.parametrize(("head", "least"), [("tanh", -1.0), ("sigmoid", 0.0)])
+def test_bounded_head_is_named_and_small_values_are_not(head: str, least: float) -> None:
+    def values(observations: Any) -> Any:
+        shares = np.tanh(observations @ WEIGHTS)
+        # Most outputs are at a bound, or few: hidden units with tanh have bounds, too.
+        return least + (1 - least) * (0.5 + 0.5 * np.tanh(size * shares))
+
+    size = 40.0
+    assert first(values) == f"bounded-output ({head})"
+    size = 1.5
+    assert not first(values).startswith("bounded-output")
 
 
 def transitions(episodes: int = 40) -> list[Any]:
