@@ -4,13 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import NOISE, TORQUES, diagnose_values, exact_values, measure
+from exact_agent import NOISE, diagnose_values, exact_values, measure
 
 from keras_pendulum.diagnosis.diagnose import diagnose_measurement
 from keras_pendulum.diagnosis.diagnosis import Diagnosis
 from keras_pendulum.diagnosis.faults import FAULTS
 from keras_pendulum.diagnosis.findings import find
 from keras_pendulum.environments.actions import TorqueActions
+from keras_pendulum.optimum.dynamics import TORQUES
 
 
 def first(diagnosis: Diagnosis) -> str:
