@@ -24,7 +24,8 @@ _SAME = 0.12  # spread of values that are nearly the same, as a share of their m
 _RIGHT_VALUES = 0.9  # correlation with the exact values
 _FEW_STEPS = 0.25  # error of the rewards of a few steps; that of rewards of another size is larger
 _LIKE_FEW_STEPS = 0.1  # error of the rewards of a few steps that leaves no doubt
-_BY_CHANCE = 0.2  # correlation of advantages that have not been learned
+_BY_CHANCE = 0.4  # correlation of advantages that have not been learned
+_BY_CHANCE_OF_TWO = 0.2  # the same of the two actions of CartPole
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
 _DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
 HEALTHY = f"{RIGHT} to 1 to 7 %"
@@ -95,8 +96,8 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         if equation.name == "observation-map" and m.value.correlation > _RIGHT_VALUES:
             return True
         # The first values of a right program pass those with an index. But they learn actions.
-        ends = not m.task.never_terminates
-        if ends and equation.variant == "index-for-value" and m.advantage.correlation > _BY_CHANCE:
+        by_chance = _BY_CHANCE if m.task.never_terminates else _BY_CHANCE_OF_TWO
+        if equation.variant == "index-for-value" and m.advantage.correlation > by_chance:
             return True
         # The values of a few steps, which a short training has, obey one with smaller rewards.
         if equation.slope is not None and m.value.slope > _OTHER_SLOPE * equation.slope:

@@ -312,8 +312,16 @@ def test_target_network_that_is_never_copied_is_named_with_small_rewards(scale: 
 
 def test_index_in_place_of_the_value_is_named() -> None:
     values = fixed_point(TARGETS["no-bootstrapping"])
-    diagnosis = diagnose(lambda o: values(o) + 2 + 1.5 * np.sin(7 * o @ UNTRAINED))
-    assert first(diagnosis) == "wrong-target (index-for-value)"
+    learned = fixed_point(right)
+    share = 0.0
+
+    def q_values(o: Any) -> Any:
+        advantages = learned(o) - learned(o).mean(axis=1, keepdims=True)
+        return values(o) + 2 + 1.5 * np.sin(7 * o @ UNTRAINED) + share * advantages
+
+    assert first(diagnose(q_values)) == "wrong-target (index-for-value)"
+    share = 0.5  # an index teaches no action, so a network that has learned some adds none
+    assert first(diagnose(q_values)) == "not-converged"
 
 
 @pytest.mark.parametrize(
