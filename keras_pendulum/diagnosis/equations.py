@@ -55,11 +55,12 @@ def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, 
 def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
     """Yields the right equation with other rewards, tasks, torques and observations."""
     factor = declared.reward_factor
+    factor = 0.0 if -0.05 < factor < 0 else factor  # so small that its sign says nothing
     if factor < -0.2 or not 0.2 < factor < 2.5:
         # No reward of the pendulum is positive, so positive values are strong evidence.
         positive = factor < -0.2 and declared.q.min() > 0
         yield Equation(
-            "reward-sign" if factor < -0.05 else "reward-scale",
+            "reward-sign" if factor < 0 else "reward-scale",
             "",
             f"{factor:.3g}·r + γ·max Q(s′, ·)",
             lambda b: b.right + (factor - 1) * b.reward,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -117,6 +118,20 @@ def test_bounded_head_is_named_and_small_values_are_not(head: str, least: float)
     assert first(values) == f"bounded-output ({head})"
     size = 1.5
     assert not first(values).startswith("bounded-output")
+
+
+def small_values(weights: Any, observations: Any) -> Any:
+    return 0.02 * np.tanh(observations @ weights)
+
+
+def test_rewards_of_nearly_no_size_have_no_sign() -> None:
+    formulas = []
+    for weights in (-WEIGHTS, WEIGHTS):
+        agent = kp.q_function(partial(small_values, weights))
+        found = kp.diagnose(agent, environment="CartPole-v1", discount=0.95).measurement
+        assert found is not None
+        formulas += [each.formula for _, each in found.agreements if each.name == "reward-scale"]
+    assert formulas and not any(each.startswith("-") for each in formulas)
 
 
 def transitions(episodes: int = 40) -> list[Any]:
