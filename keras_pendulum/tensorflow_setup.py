@@ -6,6 +6,7 @@ import contextlib
 import gc
 import os
 import re
+import shlex
 import sys
 import sysconfig
 import warnings
@@ -92,7 +93,7 @@ def warn_if_not_reproducible() -> None:
     They do where TensorFlow was imported before this package and chose its threads and its code.
     """
     if _MAY_ROUND_OTHERWISE:
-        settings = " ".join(f"{name}={_ENVIRONMENT[name]}" for name in _ROUNDING)
+        settings = " ".join(f"{name}={shlex.quote(_ENVIRONMENT[name])}" for name in _ROUNDING)
         warnings.warn(
             "TensorFlow was imported before keras_pendulum: on another computer this run may give "
             f"other numbers; import keras_pendulum first, or set {settings} first "
