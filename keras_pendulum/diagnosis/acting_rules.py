@@ -85,7 +85,8 @@ def small_torques(m: Measurement) -> Finding | None:
     factor = limit / largest
     text = Fault(
         f"The outputs stand for at most {largest:.2g} N·m, and the pendulum takes {limit:g}. With "
-        "larger torques the same values play better, so the network may have learned with them.",
+        "larger torques the same values play better. Either the training had them, or the program "
+        "does not use all that is possible.",
         f"Name the torques of the training with torques= (--torques), or multiply by {factor:.2g} "
         "where the agent acts.",
     )
