@@ -16,6 +16,8 @@ from keras_pendulum.optimum.known_dynamics import KnownDynamics
 PARTS = 10  # of the run, for the share of random actions
 _ROWS, _COMPARED = 4000, 500  # the last rows of a part, and how many of them are compared
 _CLOSE = 0.5  # N·m or N, between efforts that count as the same
+_SAME_TIME = 25  # steps, in which similar states follow each other
+_AS_RANDOM = 0.77  # above: efforts in similar states differ nearly as random ones do
 _LEVELS = np.linspace(-2, 2, 9)  # N·m, for an agent without outputs
 
 
@@ -46,11 +48,11 @@ class PlayedSteps(NamedTuple):
         return cls(steps, effort, _LEVELS if efforts is None else efforts, dynamics)
 
     def random_shares(self) -> Array | None:
-        """Returns the share of random actions in each tenth of the run, at most; None if short.
+        """Returns about the share of random actions in each tenth of the run; None if short.
 
-        A greedy policy gives similar efforts in similar states and in successive steps, and some
-        efforts more often than others. Random ones do neither. Each of the three comparisons shows
-        a bound, and the lowest one counts.
+        A greedy policy gives similar efforts in similar states and in the steps before and after,
+        and some efforts more often than others. Random ones do neither. Each of the three
+        comparisons shows about an upper bound, and the lowest one counts.
         """
         order = np.argsort(self.steps.time, kind="stable")
         if len(order) < 100 * PARTS:
@@ -64,18 +66,30 @@ class PlayedSteps(NamedTuple):
         chance = float(np.mean(np.abs(levels[:, None] - levels) <= _CLOSE))
         compared = np.random.RandomState(0).permutation(len(rows))[:_COMPARED]
         distance = self._distances(rows[compared], rows)
-        distance[np.abs(compared[:, None] - np.arange(len(rows))) < 3] = np.inf  # of the same time
+        distance[np.abs(compared[:, None] - np.arange(len(rows))) < _SAME_TIME] = np.inf
         closest = distance.argmin(axis=1)
-        follows = np.diff(rows) + np.diff(self.steps.time[rows]) == 2  # of the same environment
-        pairs = (
-            np.abs(effort[compared] - effort[closest]),
-            np.abs(np.diff(effort)[follows]),
-        )
-        bounds = []
-        for difference in pairs:
-            both_greedy = (np.mean(difference <= _CLOSE) - chance) / (1 - chance)
-            bounds.append(1 - np.sqrt(max(0.0, both_greedy)))
-        return float(min(*bounds, self._rare_share(rows)))
+        difference = np.abs(effort[compared] - effort[closest])
+        both_greedy = (np.mean(difference <= _CLOSE) - chance) / (1 - chance)
+        in_states = 1 - np.sqrt(max(0.0, both_greedy))
+        bound = min(in_states, self._rare_share(rows))
+        # Some programs hold a random action for several steps.
+        return float(bound if in_states > _AS_RANDOM else min(bound, self._lone_share(rows)))
+
+    def _lone_share(self, rows: NDArray[np.intp]) -> float:
+        """Returns the share of random actions, were all random that differ from both neighbours.
+
+        Only steps count whose neighbours have the same effort. A random action differs from it
+        unless it is the same by chance. A greedy one seldom does.
+        """
+        time, effort = self.steps.time[rows], self.effort[rows]
+        before, own, after = effort[:-2], effort[1:-1], effort[2:]
+        # Of the same environment.
+        follows = (rows[2:] - rows[:-2] == 2) & (time[2:] - time[:-2] == 2)
+        counts = follows & (np.abs(before - after) <= _CLOSE)
+        by_chance = np.abs(before[counts][:, None] - self.levels) > _CLOSE
+        expected = by_chance.mean(axis=1).sum()
+        differs = np.abs(own - before)[counts] > _CLOSE
+        return float(differs.sum() / expected) if expected else 1.0
 
     def _rare_share(self, rows: NDArray[np.intp]) -> float:
         """Returns the share of random actions, were all efforts as frequent as the rare half.

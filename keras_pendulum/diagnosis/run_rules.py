@@ -13,6 +13,7 @@ from keras_pendulum.diagnosis.played_steps import PARTS
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.stored_states import OLD_STATE
 
+_LOW = 0.08  # random actions that an ε of 0.1 shows at least
 _LONG_RUN = 4000  # steps: 20 episodes of the pendulum
 
 
@@ -62,16 +63,16 @@ def exploration(m: Measurement) -> Finding | None:
         return None
     first, last, is_long = float(shares[0]), float(shares[-2:].mean()), r.steps >= _LONG_RUN
     # A program that is stopped early has random actions at its end, too, but not more of them.
-    if last > 0.7 and (is_long or last > first + 0.3):
+    if last > 0.7 and (is_long or last > float(shares[:2].mean()) + 0.3):
         evidence = f"about {last:.0%} of the actions of the last fifth are random"
         return Finding("exploration", evidence, "below 10 %")
     # Many programs learn with a constant ε of 0.1, and in some ε falls within a tenth of the run.
-    begin, limit, low = "the first tenth", 0.06, first
+    begin, low = "the first tenth", first
     if is_long and m.task.never_terminates and first < 0.25:
-        deviation = (0.1 * 0.9 * PARTS / r.steps) ** 0.5
-        begin, limit, low = "one of the first tenths", 0.1 - deviation, float(shares[:3].min())
+        begin, low = "one of the first tenths", float(shares[:3].min())
+    limit = _LOW - 3 * (_LOW * (1 - _LOW) * PARTS / r.steps) ** 0.5  # three standard deviations
     if low < limit and len(r.played.effort) == r.steps:
-        evidence = f"at most {low:.0%} of the actions of {begin} of the run are random"
+        evidence = f"about {low:.0%} of the actions of {begin} of the run are random"
         return Finding("exploration", evidence, "above 10 %")
     return None
 

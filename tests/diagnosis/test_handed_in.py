@@ -14,7 +14,7 @@ import pytest
 import torch
 from exact_agent import NOISE, PENDULUM, coarse_value, diagnose_values, exact_values, measure
 from gymnasium.wrappers import TransformAction, TransformReward
-from recorded_runs import buffer_of, record_run
+from recorded_runs import buffer_of, record_run, swing_up
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import run_rules, transition_rules
@@ -370,6 +370,27 @@ def test_policy_without_values_is_judged_by_its_record(run: Any) -> None:
 )
 def test_usual_exploration_is_no_fault(episodes: int, epsilon: Callable[[float], float]) -> None:
     assert first(record_run(episodes=episodes, epsilon=epsilon)) == "nothing"
+
+
+@pytest.mark.parametrize(("epsilon", "shown"), [(0.02, True), (0.12, False)])
+def test_policy_that_changes_in_learning_is_not_exploration(epsilon: float, shown: bool) -> None:
+    steps = count()
+    act = lambda o: 2 * np.sign(np.sin(o @ [4, 5, 3] + next(steps) / 50))  # noqa: E731
+    run = record_run(act, episodes=40, epsilon=lambda done: epsilon)
+    assert (first(run) == "exploration") is shown
+
+
+def test_random_actions_may_be_held_for_some_steps() -> None:
+    steps, random, held = count(), np.random.RandomState(1), [0.0]
+
+    def act(observation: Any) -> float:
+        step = next(steps)
+        if step % 6 == 0:
+            explores = random.random_sample() < 1 - step / 4000
+            held[0] = random.choice(TORQUES) if explores else np.nan
+        return swing_up(observation) if np.isnan(held[0]) else held[0]
+
+    assert first(record_run(act, episodes=40, epsilon=lambda done: 0)) == "nothing"
 
 
 def test_record_may_be_a_file_and_on_the_command_line(
