@@ -81,7 +81,7 @@ COMMANDS = (
         packages=("psutil", "torch"),
     ),
     Command("learning.cartpole_falls", 1, results=("cartpole_falls",)),
-    Command("diagnosis.single_faults", 45, (FOLDER,), ("diagnosis",)),
+    Command("diagnosis.single_faults", 10, (FOLDER,), ("diagnosis",)),
     Command(
         "diagnosis.strangers",
         90,
@@ -96,10 +96,10 @@ COMMANDS = (
         ("diagnosis_cartpole",),
         ("torch",),
     ),
-    Command("diagnosis.fault_pairs", 60, (FOLDER,), ("diagnosis_pairs",)),
+    Command("diagnosis.fault_pairs", 6, (FOLDER,), ("diagnosis_pairs",)),
     Command(
         "diagnosis.healthy_networks",
-        45,
+        8,
         (FOLDER,),
         ("diagnosis_healthy",),
         ("torch", "stable_baselines3"),

@@ -6,8 +6,7 @@ Trains 44 networks without a fault in FOLDER, or this share of them: with the pr
 settings of a short run of `benchmarks.diagnosis.faults`, by the PyTorch twin of tests/torch, by
 Stable-Baselines3 and by this package. COUNTS says how many of each. Each is diagnosed alone, and
 with its run's record where it has one. The command may be stopped and started again. Remove
-FOLDER/healthy.jsonl after a change of the rules. Needs the extra `bench`. It takes three quarters
-of an hour.
+FOLDER/healthy.jsonl after a change of the rules. Needs the extra `bench`.
 """
 
 from __future__ import annotations
