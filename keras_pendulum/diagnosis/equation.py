@@ -63,10 +63,9 @@ class Equation:
         if self.change is None and not 0.8 < own.position < 1.35:
             return False
         if self.flat == np.inf:
-            return True
+            return right.correlation > _REVERSED
         if self.flat:
-            # A negative correlation is that of reversed torques.
-            return own.advantages <= self.flat and -0.3 < right.correlation < 0.65
+            return own.advantages <= self.flat and _REVERSED < right.correlation < 0.65
         return own.correlation > (0.4 if self.variant else 0.3) or own.error < 0.03
 
     def _explains_ends(self, own: Agreement, right: Agreement) -> bool:
@@ -74,6 +73,8 @@ class Equation:
         error, share, correlation = _LIMITS_WITH_ENDS.get(self.name, (0.2, 0.5, 0.8))
         if self.variant:
             share = min(share, self.share)
+            if own.correlation > 0.95 and right.correlation < 0.5:
+                error = 2 * error  # the advantages leave no doubt
         if own.error > min(error, share * right.error) or own.correlation < correlation:
             return False
         if self.name == "missing-end":
@@ -86,6 +87,7 @@ class Equation:
 
 
 _SATISFIED = 0.04  # an error that leaves no doubt
+_REVERSED = -0.3  # correlation of the advantages with the right ones: that of reversed torques
 
 # The largest error, its share of the right equation's error, and the least correlation.
 _LIMITS_WITH_ENDS = {

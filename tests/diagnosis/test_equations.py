@@ -14,6 +14,7 @@ from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
 import keras_pendulum as kp
 from keras_pendulum.diagnosis.backup import Agreement
 from keras_pendulum.diagnosis.equation import Equation
+from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
 
 LAST = len(TORQUES) - 1
 UNTRAINED = np.random.RandomState(3).normal(size=(3, 5)) * 0.1
@@ -285,6 +286,26 @@ def test_equation_without_advantages_needs_flat_values(
     equation = Equation("wrong-loss", "", "", lambda b: b.right, flat=0.4)
     own = Agreement(0.1, 0.0, advantages, 1.0)
     assert equation.explains(own, Agreement(0.2, correlation, 1.0, 0.0)) is explains
+
+
+@pytest.mark.parametrize(("correlation", "explains"), [(0.5, True), (0.0, True), (-0.6, False)])
+def test_share_of_the_right_targets_does_not_turn_the_advantages(
+    correlation: float, explains: bool
+) -> None:
+    own, best = Agreement(0.3, correlation, 1, 0.96), Agreement(3.6, correlation, 1.0, 0.0)
+    assert ZERO_OTHERS.explains(own, best) is explains
+
+
+@pytest.mark.parametrize(
+    ("own", "right", "explains"),
+    [(0.99, 0.2, True), (0.85, 0.2, False), (0.99, 0.9, False)],
+)
+def test_advantages_show_an_equation_of_cartpole_that_fits_roughly(
+    own: float, right: float, explains: bool
+) -> None:
+    equation = Equation("wrong-target", "same-action-next", "", lambda b: b.right)
+    best = Agreement(1.3, right, 1.0, 0.0)
+    assert equation.explains(Agreement(0.3, own, 1.0, 1.0), best, ends=True) is explains
 
 
 def test_target_network_that_is_never_copied_is_named() -> None:
