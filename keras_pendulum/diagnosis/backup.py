@@ -92,6 +92,11 @@ class Backup(NamedTuple):
         return np.asarray(terms @ solution)
 
     @property
+    def index_correlation(self) -> float:
+        """The correlation of `offset` with the index of the best next action."""
+        return line_fit(self.offset, self.next_q.argmax(axis=2)[self.continues]).correlation
+
+    @property
     def reward_line(self) -> Fit:
         """The line over the rewards that obeys the right equation best in their place.
 

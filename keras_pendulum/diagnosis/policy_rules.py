@@ -26,6 +26,7 @@ _SHARE = 0.7  # of the error of the right equation
 _SHARE_OF_BOTH = 0.9  # the same where one step fits better, too, and advantages have been learned
 _LEARNED = 0.4  # correlation of the advantages
 _SHARE_OF_SECOND = 0.95  # of that of the next best equation, in both errors together
+_NEARLY = 1.03
 _LOWER = -0.25  # spreads: how much lower the values are than those of the greedy policy
 
 
@@ -56,6 +57,8 @@ def followed_policy(m: Measurement) -> Finding | None:
     share = _SHARE_OF_BOTH if fits and learned else _SHARE
     if both[equation] > _SHARE_OF_SECOND * both[second]:
         return None
+    if one_step > _NEARLY * min(m.equation_errors[each.formula] for each in errors):
+        return None  # one step and ten show two equations
     if own > min(_LARGEST_ERROR, share * right.error):
         return None
     evidence = (

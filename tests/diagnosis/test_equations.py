@@ -12,8 +12,11 @@ from conftest import DATA
 from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
 
 import keras_pendulum as kp
-from keras_pendulum.diagnosis.backup import Agreement
+from keras_pendulum.diagnosis.backup import Agreement, Backup
+from keras_pendulum.diagnosis.constant_futures import constant_futures
 from keras_pendulum.diagnosis.equation import Equation
+from keras_pendulum.diagnosis.policy_rules import followed_policy
+from keras_pendulum.diagnosis.target_equations import TARGETS as WRONG_TARGETS
 from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
 
 LAST = len(TORQUES) - 1
@@ -248,6 +251,18 @@ def test_ten_steps_show_the_target_where_one_step_does_not(
     assert "over 10 steps, the values satisfy r + γ·" in diagnosis.verdict
 
 
+def test_one_step_and_ten_steps_must_show_the_same_target(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    diagnosis = diagnose(rough(TARGETS["wrong-target (mean-next)"], 3, 4))
+    m = diagnosis.measurement
+    assert followed_policy(m) is not None
+    last = "r + γ·Q(s′, last action)"
+    errors = m.equation_errors | {last: 0.9 * m.equation_errors["r + γ·mean Q(s′, ·)"]}
+    monkeypatch.setitem(m.__dict__, "equation_errors", errors)
+    assert followed_policy(m) is None
+
+
 @pytest.mark.parametrize("waves", [2, 4, 8])
 @pytest.mark.parametrize("size", [1, 4])
 def test_right_values_with_a_rough_error_follow_no_other_policy(size: float, waves: int) -> None:
@@ -308,6 +323,13 @@ def test_advantages_show_an_equation_of_cartpole_that_fits_roughly(
     assert equation.explains(Agreement(0.3, own, 1.0, 1.0), best, ends=True) is explains
 
 
+@pytest.mark.parametrize(("error", "explains"), [(0.16, True), (0.3, False), (0.19, False)])
+def test_next_value_of_the_action_before_fits_far_better(error: float, explains: bool) -> None:
+    equation = next(each for each in WRONG_TARGETS if each.variant == "same-action-next")
+    best = Agreement(0.6 if error < 0.19 else 0.4, 0.3, 1.0, 0.0)  # early values fit both alike
+    assert equation.explains(Agreement(error, 0.94, 1.0, 1.0), best) is explains
+
+
 def test_target_network_that_is_never_copied_is_named() -> None:
     values = fixed_point(TARGETS["no-bootstrapping"])
     diagnosis = diagnose(lambda o: values(o) + 0.3 + 0.9 * (o @ UNTRAINED).max(axis=1)[:, None])
@@ -343,6 +365,20 @@ def test_index_in_place_of_the_value_is_named() -> None:
     assert first(diagnose(q_values)) == "wrong-target (index-for-value)"
     share = 0.5  # an index teaches no action, so a network that has learned some adds none
     assert first(diagnose(q_values)) == "not-converged"
+
+
+@pytest.mark.parametrize("obeys", [True, False])
+def test_index_is_seen_where_what_is_added_is_rough(obeys: bool) -> None:
+    random = np.random.RandomState(0)
+    reward, next_q = random.uniform(-16, 0, (200, 21)), random.normal(size=(200, 21, 21))
+    index = next_q.argmax(axis=2)
+    added = 0.9 * (index if obeys else random.permutation(index)) + random.normal(size=reward.shape)
+    angle = random.uniform(-np.pi, np.pi, reward.size)
+    seen = np.column_stack([np.cos(angle), np.sin(angle), random.uniform(-8, 8, angle.shape)])
+    goes_on = np.ones(reward.shape, bool)
+    backup = Backup(reward + added, reward, next_q, 0.9, seen.astype(np.float32), goes_on)
+    named = [each.variant for each in constant_futures(backup) if each.offset]
+    assert ("index-for-value" in named) is obeys
 
 
 @pytest.mark.parametrize(
