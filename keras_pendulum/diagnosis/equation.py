@@ -66,8 +66,7 @@ class Equation:
             return right.correlation > _REVERSED
         if self.flat:
             return own.advantages <= self.flat and _REVERSED < right.correlation < 0.65
-        is_clear = own.error < 0.4 * right.error or not self.variant
-        return own.correlation > (0.3 if is_clear else 0.4) or own.error < 0.03
+        return own.correlation > (0.4 if self.variant else 0.3) or own.error < 0.03
 
     def _explains_ends(self, own: Agreement, right: Agreement) -> bool:
         """Returns the same for a task whose episodes terminate: its values show more."""

@@ -251,7 +251,7 @@ def test_ten_steps_show_the_target_where_one_step_does_not(
     assert "over 10 steps, the values satisfy r + γ·" in diagnosis.verdict
 
 
-def test_one_step_and_ten_steps_must_show_the_same_target(
+def test_mean_of_the_next_values_must_fit_one_step_best_too(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     diagnosis = diagnose(rough(TARGETS["wrong-target (mean-next)"], 3, 4))
