@@ -111,20 +111,23 @@ def _bounded_everywhere(m: Measurement) -> Finding | None:
 
 def same_everywhere(m: Measurement) -> Finding | None:
     """Finds values that are the same for all states or for all actions."""
-    largest = float(np.abs(m.learned_q).max())
     units = max(stuck_units(m))
-    spread = float(m.learned_q.std(axis=0).max())
-    if spread < 1e-6 * max(1.0, largest):
-        evidence = f"values that differ by {spread:.1g} from state to state"
+    spread = m.learned_q.std(axis=0)
+    if _is_constant(spread, m.learned_q):
+        evidence = f"values that differ by {spread.max():.1g} from state to state"
         if units > 0.99:
             evidence += f"; {units:.0%} of a layer's units saturated or dead"
         return Finding("broken-network", evidence, f"{m.value_spread:.0f}")
-    across = float(np.ptp(m.learned_q, axis=1).max())
-    if across < 1e-6 * max(1.0, largest):
-        return Finding(
-            "broken-network", f"values that differ by {across:.1g} from action to action", "above 1"
-        )
+    across = np.ptp(m.learned_q, axis=1)
+    if _is_constant(across, m.learned_q):
+        evidence = f"values that differ by {across.max():.1g} from action to action"
+        return Finding("broken-network", evidence, "above 1")
     return None
+
+
+def _is_constant(spread: Array, values: Array) -> bool:
+    """Returns whether the spread of values is no more than their rounding."""
+    return bool(spread.max() < 1e-6 * max(1.0, float(np.abs(values).max())))
 
 
 def lowest_mean(m: Measurement) -> Finding | None:
@@ -142,7 +145,7 @@ def batch_broadcast(m: Measurement) -> Finding | None:
     values = m.backup.q
     mean, spread = float(values.mean()), float(values.std())
     reward = mean * (1 - m.discount)  # of a step, if this value is the mean target
-    if not values.std(axis=0).any() or max(stuck_units(m)) > 0.99:  # a dead network
+    if _is_constant(values.std(axis=0), values) or max(stuck_units(m)) > 0.99:  # a dead network
         return None
     if m.task.never_terminates:
         own = spread < 0.3 * m.backup.reward.std() and _LOWEST_MEAN_REWARD < reward < -0.3

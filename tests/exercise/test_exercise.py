@@ -234,8 +234,8 @@ def test_program_with_an_error_is_not_judged(tmp_path: Path, capfd: Any) -> None
 def test_program_that_does_not_end_is_stopped(tmp_path: Path, capfd: Any) -> None:
     path = tmp_path / "mine.py"
     path.write_text(ENDLESS, encoding="utf-8")
-    with pytest.raises(UserError, match=r"mine.py was stopped after 8 s; does a loop not end"):
-        check(7, path, seconds=8)
+    with pytest.raises(UserError, match=r"mine.py was stopped after 4 s; does a loop not end"):
+        check(7, path, seconds=4)
 
 
 @pytest.mark.parametrize(
