@@ -18,6 +18,7 @@ _ROWS, _COMPARED = 4000, 500  # the last rows of a part, and how many of them ar
 _CLOSE = 0.5  # N·m or N, between efforts that count as the same
 _SAME_TIME = 25  # steps, in which similar states follow each other
 _AS_RANDOM = 0.77  # above: efforts in similar states differ nearly as random ones do
+_HELD = 0.1  # below: hardly any effort differs from those before and after it
 _LEVELS = np.linspace(-2, 2, 9)  # N·m, for an agent without outputs
 
 
@@ -51,7 +52,7 @@ class PlayedSteps(NamedTuple):
         """Returns about the share of random actions in each tenth of the run; None if short.
 
         A greedy policy gives similar efforts in similar states and in the steps before and after,
-        and some efforts more often than others. Random ones do neither. Each of the three
+        and some efforts more often than others. Random ones do neither. Each of the four
         comparisons shows about an upper bound, and the lowest one counts.
         """
         order = np.argsort(self.steps.time, kind="stable")
@@ -68,12 +69,17 @@ class PlayedSteps(NamedTuple):
         distance = self._distances(rows[compared], rows)
         distance[np.abs(compared[:, None] - np.arange(len(rows))) < _SAME_TIME] = np.inf
         closest = distance.argmin(axis=1)
-        difference = np.abs(effort[compared] - effort[closest])
-        both_greedy = (np.mean(difference <= _CLOSE) - chance) / (1 - chance)
-        in_states = 1 - np.sqrt(max(0.0, both_greedy))
-        bound = min(in_states, self._rare_share(rows))
-        # Some programs hold a random action for several steps.
-        return float(bound if in_states > _AS_RANDOM else min(bound, self._lone_share(rows)))
+        follows = np.diff(rows) + np.diff(self.steps.time[rows]) == 2  # of the same environment
+
+        def share(difference: Array) -> float:
+            both_greedy = (np.mean(difference <= _CLOSE) - chance) / (1 - chance)
+            return 1 - float(np.sqrt(max(0.0, both_greedy)))
+
+        in_states = share(np.abs(effort[compared] - effort[closest]))
+        bound, lone = min(in_states, self._rare_share(rows)), self._lone_share(rows)
+        if in_states > _AS_RANDOM and lone < _HELD:  # random actions that last for several steps
+            return bound
+        return min(bound, lone, share(np.abs(np.diff(effort)[follows])))
 
     def _lone_share(self, rows: NDArray[np.intp]) -> float:
         """Returns the share of random actions, were all random that differ from both neighbours.
