@@ -73,7 +73,7 @@ class PlayedSteps(NamedTuple):
 
         def share(difference: Array) -> float:
             both_greedy = (np.mean(difference <= _CLOSE) - chance) / (1 - chance)
-            return 1 - float(np.sqrt(max(0.0, both_greedy)))
+            return 1 - max(0.0, float(both_greedy)) ** 0.5
 
         in_states = share(np.abs(effort[compared] - effort[closest]))
         bound, lone = min(in_states, self._rare_share(rows)), self._lone_share(rows)
