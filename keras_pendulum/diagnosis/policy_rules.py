@@ -26,7 +26,7 @@ _SHARE = 0.7  # of the error of the right equation
 _SHARE_OF_BOTH = 0.9  # the same where one step fits better, too, and advantages have been learned
 _LEARNED = 0.4  # correlation of the advantages
 _SHARE_OF_SECOND = 0.95  # of that of the next best equation, in both errors together
-_NEARLY = 1.03
+_NEARLY = 1.03  # times the lowest error of one step
 _LOWER = -0.25  # spreads: how much lower the values are than those of the greedy policy
 
 

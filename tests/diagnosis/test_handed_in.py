@@ -373,7 +373,7 @@ def test_usual_exploration_is_no_fault(episodes: int, epsilon: Callable[[float],
 
 
 @pytest.mark.parametrize(("epsilon", "shown"), [(0.02, True), (0.12, False)])
-def test_policy_that_changes_in_learning_is_not_exploration(epsilon: float, shown: bool) -> None:
+def test_low_epsilon_is_seen_where_the_policy_changes(epsilon: float, shown: bool) -> None:
     steps = count()
     act = lambda o: 2 * np.sign(np.sin(o @ [4, 5, 3] + next(steps) / 50))  # noqa: E731
     run = record_run(act, episodes=40, epsilon=lambda done: epsilon)
