@@ -120,7 +120,7 @@ class Player:
 
     def log(self, kind: str) -> list[dict[str, Any]]:
         """Returns the entries of a browser log since the last call."""
-        entries: list[dict[str, Any]] = self.driver.get_log(kind)  # type: ignore[no-untyped-call]
+        entries: list[dict[str, Any]] = self.driver.get_log(kind)
         return entries
 
     def pass_time(self, seconds: int, before: str = "") -> int:

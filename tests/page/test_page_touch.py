@@ -71,7 +71,7 @@ def test_a_press_and_a_drag_on_the_portrait_choose_the_state(
             "  x * top + (1 - x) * bottom - height / 2])",
             places,
         )
-        pointer = PointerInput(finger, finger)  # type: ignore[no-untyped-call]
+        pointer = PointerInput(finger, finger)
         actions = ActionBuilder(player.driver, mouse=pointer, duration=0)
         action: Any = actions.pointer_action
         portrait = player.find("portrait")

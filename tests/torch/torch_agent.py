@@ -237,7 +237,7 @@ class Agent:
         q = self.online(batch.observation)  # [B, A]
         loss = self.loss(q, batch.action, target)
         self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         self.optimizer.step()
         with torch.no_grad():
             self.update_target(self.online, self.target, self.optimizer.iterations)

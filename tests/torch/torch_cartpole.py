@@ -85,7 +85,7 @@ class Agent:
         self.steps += 1
         self.optimizer.param_groups[0]["eps"] = self.epsilon(self.steps)
         self.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         nn.utils.clip_grad_value_(self.online.parameters(), GRADIENT_CLIP)
         self.optimizer.step()
         source, destination = self.online.state_dict(), self.target.state_dict()
