@@ -15,14 +15,18 @@ from keras_pendulum.diagnosis.equation import Equation
 from keras_pendulum.diagnosis.signals import Array, line_fit
 from keras_pendulum.diagnosis.target_equations import NEGATIVE_NEXT, ZERO_OTHERS
 
+# What a network that has not learned hardly exceeds. One with 64-64 units, Keras' initial weights
+# and speeds up to 8 in its input has the largest values.
+_UNTRAINED, _UNTRAINED_SPREAD = 2.0, 0.54
+
 
 def constant_futures(declared: Backup) -> Iterator[Equation]:
     """Yields the equations in which a constant takes the place of the next values."""
     scale, last = declared.reward_scale, declared.q.shape[1] - 1
     output = declared.offset * scale  # as the program adds an index, or what has not learned
     mean, spread = float(output.mean()), float(output.std())
-    small = 0.06 < spread < 0.25 * scale * declared.q.std()
-    frozen = bool(small and declared.offset_is_smooth and -0.1 < mean < 2)
+    small = 0.06 < spread < min(_UNTRAINED_SPREAD, 0.25 * scale * declared.q.std())
+    frozen = bool(small and declared.offset_is_smooth and -0.1 < mean < _UNTRAINED)
     line = line_fit(declared.q, declared.reward)
     usual = 0.6 < line.slope < 1.3
     # No reward is positive, so no other target adds positive numbers that differ.
@@ -32,8 +36,8 @@ def constant_futures(declared: Backup) -> Iterator[Equation]:
     rewards = line.correlation > 0.85 and 0.45 < line.slope < 1.8
     rest = float((declared.offset - declared.offset_by_next_state).std())
     smooth = rest < 0.33 * declared.q.std()  # so what is added is a function of the next state
-    values = smooth and (rewards or float(declared.q.mean()) * scale > 0.5)
-    indices = indices and (values or declared.index_correlation > 0.4)
+    values = smooth and (rewards or float(declared.q.mean()) * scale > _UNTRAINED)
+    indices = indices and (values or (declared.index_correlation > 0.4 and spread > 0.5))
     nothing = abs(float(declared.offset.mean())) < max(0.1, float(declared.offset.std()))
     found = {
         "no-bootstrapping": usual and not frozen and nothing,
@@ -41,7 +45,7 @@ def constant_futures(declared: Backup) -> Iterator[Equation]:
         "batch-max": usual and not frozen and not indices and not nothing,
         "index-for-value": indices,
     }
-    positive = bool(np.mean(output > 0) > 0.9) and mean < 2
+    positive = bool(np.mean(output > 0) > 0.85) and mean < _UNTRAINED
     for equation in _offset_equations(declared):
         yield replace(equation, offset=found[equation.variant or equation.name])
         if equation.variant == "frozen-target" and not indices:
@@ -54,6 +58,7 @@ def constant_futures(declared: Backup) -> Iterator[Equation]:
                 "network that has not: the target network is never copied, or the training ended "
                 "before its first copy.",
                 largest_error=0.35,  # a polynomial is not all of a network
+                share=0.65,  # large numbers are a part of the next values, too
                 offset=positive,
             )
 

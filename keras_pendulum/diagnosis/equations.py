@@ -56,7 +56,10 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
     """Yields the right equation with other rewards, tasks, torques and observations."""
     factor = declared.reward_factor
     factor = 0.0 if -0.05 < factor < 0 else factor  # so small that its sign says nothing
-    if factor < -0.2 or not 0.2 < factor < 2.5:
+    goes_on = visited.dynamics.task.never_terminates
+    # Smaller rewards below 0 leave no value above 0.
+    too_high = goes_on and factor > 0 and float(np.mean(declared.q > 0)) > 0.9
+    if factor < -0.2 or not (too_high or 0.2 < factor < 2.5):
         # No reward of the pendulum is positive, so positive values are strong evidence.
         positive = factor < -0.2 and declared.q.min() > 0
         yield Equation(
@@ -66,9 +69,9 @@ def _changes(visited: Visited, declared: Backup) -> Iterator[Equation]:
             lambda b: b.right + (factor - 1) * b.reward,
             largest_error=0.25 if positive else 0.12,
             share=0.5 if positive else 0.75,
-            slope=factor if 0 < factor < 1 and visited.dynamics.task.never_terminates else None,
+            slope=factor if 0 < factor < 1 and goes_on else None,
         )
-    line, goes_on = declared.reward_line, visited.dynamics.task.never_terminates
+    line = declared.reward_line
     top = line.offset / max(1 - visited.discount, 0.005)  # the value of rewards that stay 0
     fits = line.slope > 0.02 and line.correlation > 0.6
     if goes_on and fits and declared.q.max() > 0.4 * top > 0.5:

@@ -40,8 +40,10 @@ NEGATIVE_NEXT = Equation(
     lambda b: b.reward - b.future * b.next_q.max(axis=2),
     "The target subtracts the next values, so a good next state makes a value worse.",
     "Add the next values: r + γ·max Q(s′, ·).",
-    largest_error=0.6,
-    share=0.2,
+    # They alternate, so they converge slowly. But no others are as far from the right ones.
+    largest_error=0.7,
+    share=0.25,
+    correlation=0.1,
 )
 
 TARGETS = (

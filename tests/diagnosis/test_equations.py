@@ -16,8 +16,8 @@ from keras_pendulum.diagnosis.backup import Agreement, Backup
 from keras_pendulum.diagnosis.constant_futures import constant_futures
 from keras_pendulum.diagnosis.equation import Equation
 from keras_pendulum.diagnosis.policy_rules import followed_policy
+from keras_pendulum.diagnosis.target_equations import NEGATIVE_NEXT, ZERO_OTHERS
 from keras_pendulum.diagnosis.target_equations import TARGETS as WRONG_TARGETS
-from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
 
 LAST = len(TORQUES) - 1
 UNTRAINED = np.random.RandomState(3).normal(size=(3, 5)) * 0.1
@@ -312,6 +312,17 @@ def test_share_of_the_right_targets_does_not_turn_the_advantages(
 
 
 @pytest.mark.parametrize(
+    ("error", "right", "explains"), [(0.63, 3.6, True), (0.75, 3.6, False), (0.63, 2.0, False)]
+)
+def test_subtracted_values_are_far_from_the_right_ones(
+    error: float, right: float, explains: bool
+) -> None:
+    """They converge slowly, so their own equation is satisfied badly, too."""
+    best = Agreement(right, -0.17, 1.0, 0.0)
+    assert NEGATIVE_NEXT.explains(Agreement(error, 0.17, 1.0, 1.1), best) is explains
+
+
+@pytest.mark.parametrize(
     ("own", "right", "explains"),
     [(0.99, 0.2, True), (0.85, 0.2, False), (0.99, 0.9, False)],
 )
@@ -343,14 +354,37 @@ def test_rewards_with_an_error_have_no_constant_added(mean: float) -> None:
     assert first(diagnosis) == "no-bootstrapping"
 
 
+@pytest.mark.parametrize("size", [1.0, 1.6])
 @pytest.mark.parametrize("scale", [1, 0.1, 0.02])
-def test_target_network_that_is_never_copied_is_named_with_small_rewards(scale: float) -> None:
+def test_target_network_that_is_never_copied_is_named_with_small_rewards(
+    scale: float, size: float
+) -> None:
     values = fixed_point(TARGETS["no-bootstrapping"])
 
     def q_values(o: Any) -> Any:
-        return scale * values(o) + 0.4 + 0.9 * (o @ UNTRAINED).max(axis=1)[:, None]
+        return scale * values(o) + size * (0.4 + 0.9 * (o @ UNTRAINED).max(axis=1)[:, None])
 
     assert first(diagnose(q_values, reward_scale=scale)) == "wrong-target (frozen-target)"
+
+
+@pytest.mark.parametrize(("spread", "variant"), [(0.3, "frozen-target"), (0.6, "index-for-value")])
+def test_index_of_three_differs_more_than_the_values_of_a_network_that_has_not_learned(
+    spread: float, variant: str
+) -> None:
+    random = np.random.RandomState(0)
+    reward, angle = random.uniform(-16, 0, (200, 3)), random.uniform(-np.pi, np.pi, 600)
+    seen = np.column_stack([np.cos(angle), np.sin(angle), random.uniform(-8, 8, angle.shape)])
+    added = 0.9 + spread * 2**0.5 * np.sin(angle).reshape(reward.shape)
+    backup = Backup(
+        reward + added,
+        reward,
+        random.normal(size=(200, 3, 3)),
+        0.9,
+        seen.astype(np.float32),
+        np.ones(reward.shape, bool),
+    )
+    named = {each.variant for each in constant_futures(backup) if each.offset}
+    assert named & {"frozen-target", "index-for-value"} == {variant}
 
 
 def test_index_in_place_of_the_value_is_named() -> None:
