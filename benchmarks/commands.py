@@ -84,7 +84,7 @@ COMMANDS = (
     Command("diagnosis.single_faults", 10, (FOLDER,), ("diagnosis",)),
     Command(
         "diagnosis.strangers",
-        90,
+        100,
         (FOLDER, "Pendulum-v1"),
         ("diagnosis_strangers",),
         ("torch",),
