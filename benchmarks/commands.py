@@ -126,7 +126,7 @@ COMMANDS = (
         ("study_scale",),
         ("psutil", "scipy", "distributed"),
     ),
-    Command("files.hostile_files", 60, results=("hostile_files",), packages=("psutil",)),
+    Command("files.hostile_files", 45, results=("hostile_files",), packages=("psutil",)),
     Command("files.keras_files", 10, packages=("tf_keras",)),
     Command("pages.fault_pictures", 5, (FOLDER,)),
     Command("pages.first_run", 2, results=("first_run",), packages=("psutil",)),

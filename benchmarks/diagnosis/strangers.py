@@ -7,8 +7,8 @@ Trains the programs of `benchmarks.diagnosis.stranger_programs`, or with CartPol
 each right one. Each program has a seed of its own, from FIRST_SEED on. docs/diagnose.md says on
 which seeds the limits of the rules were set. The command may be stopped and started again: networks
 and diagnoses in FOLDER are used again. Remove FOLDER/strangers.jsonl after a change of the rules.
-Needs torch. Takes 100 minutes for the pendulum, where some mistakes cost little, so that twelve rounds
-count eight of most kinds. The eight rounds of CartPole take an hour and a half.
+Needs torch. Takes 100 minutes for the pendulum, where some mistakes cost little, so that twelve
+rounds count eight of most kinds. The eight rounds of CartPole take an hour and a half.
 """
 
 from __future__ import annotations
