@@ -47,7 +47,7 @@ REASONS: dict[str, dict[str, str]] = {
         "learning rate is constant too",
         "learning_rate": "40 updates after an episode are too few for the smaller one",
         "learning_rate_schedule": "with a constant rate the policy jumps until the last episode, "
-        "and its average may still let the cart drift",
+        "which its average mostly hides",
         "learning_rate_min": "weights that still move a little have a better average",
         "tau": "the target network follows faster, because there are fewer updates",
         "average_updates": "the last update may leave a policy that drifts off the track; the "

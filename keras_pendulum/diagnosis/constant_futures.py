@@ -1,6 +1,7 @@
-"""The equations in which a constant takes the place of the next values.
+"""The equations that Q - r shows: in most, a constant takes the place of the next values.
 
-Q - r shows them: it is nothing, a constant, an index, or the values of a network that never learns.
+Then Q - r is nothing, a constant, an index, or the values of a network that never learns. Where it
+falls as the next values rise, they are subtracted.
 """
 
 from __future__ import annotations
@@ -21,7 +22,12 @@ _UNTRAINED, _UNTRAINED_SPREAD = 2.0, 0.54
 
 
 def constant_futures(declared: Backup) -> Iterator[Equation]:
-    """Yields the equations in which a constant takes the place of the next values."""
+    """Yields the equations that Q - r shows."""
+    highest = declared.next_q.max(axis=2)[declared.continues]
+    falls = line_fit(declared.offset, highest)  # as the next values rise
+    if -1.45 < falls.slope < -0.5 and falls.correlation < -0.85:
+        yield replace(NEGATIVE_NEXT, offset=True)
+        return
     scale, last = declared.reward_scale, declared.q.shape[1] - 1
     output = declared.offset * scale  # as the program adds an index, or what has not learned
     mean, spread = float(output.mean()), float(output.std())

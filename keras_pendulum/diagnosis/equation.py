@@ -31,7 +31,6 @@ class Equation:
     remedy: str = ""
     largest_error: float = 0.25
     share: float = 0.88  # of the right equation's error that it may have at most
-    correlation: float = 0.4  # of the advantages, at least, where it has a variant
     flat: float = 0.0  # above 0: the advantages of Q are at most this share of the right ones
     like_short_training: bool = False  # whether right values that have not converged look like it
     offset: bool = False  # whether it has no next values, and Q - r is as it says
@@ -67,7 +66,7 @@ class Equation:
             return right.correlation > _REVERSED
         if self.flat:
             return own.advantages <= self.flat and _REVERSED < right.correlation < 0.65
-        return own.correlation > (self.correlation if self.variant else 0.3) or own.error < 0.03
+        return own.correlation > (0.4 if self.variant else 0.3) or own.error < 0.03
 
     def _explains_ends(self, own: Agreement, right: Agreement) -> bool:
         """Returns the same for a task whose episodes terminate: its values show more."""

@@ -27,6 +27,7 @@ _LIKE_FEW_STEPS = 0.1  # error of the rewards of a few steps that leaves no doub
 _BY_CHANCE = 0.4  # correlation of advantages that have not been learned
 _BY_CHANCE_OF_TWO = 0.2  # the same of the two actions of CartPole
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
+_CLEARLY_BEST = 0.85  # share of the next best error that an observation may have
 _DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
 HEALTHY = f"{RIGHT} to 1 to 7 %"
 
@@ -66,7 +67,17 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
     right = m.right_agreement
     if right.error < RIGHT_ERROR:
         return None
-    agreements = m.agreements
+    agreements, ends = m.agreements, not m.task.never_terminates
+
+    @cache
+    def second_observation() -> float:
+        """Returns the second lowest error of the observations that explain the values."""
+        errors = [
+            own.error
+            for own, equation in agreements
+            if equation.name == "observation-map" and equation.explains(own, right, ends)
+        ]
+        return sorted([*errors, np.inf, np.inf])[1]
 
     @cache
     def acts_as_stored() -> bool:
@@ -89,12 +100,16 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         error = few.rollouts.q - few.rollouts.target(equation.discount)
         return float(np.sqrt(np.mean(error**2))) / m.backup.spread > 0.5 * few.error
 
-    def is_refuted(equation: Equation) -> bool:
+    def is_refuted(own: Agreement, equation: Equation) -> bool:
         """Returns whether the exact values or the record show that this equation is not its own."""
         if m.excess > _DIVERGED and equation.variant != "frozen-target":
             return True
-        if equation.name == "observation-map" and m.value.correlation > _RIGHT_VALUES:
-            return True
+        if equation.name == "observation-map":
+            # There are many, so some fit by chance, and then about as well as each other. In
+            # CartPole, several fit alike also where the observation is wrong.
+            fits_alike = not ends and own.error > _CLEARLY_BEST * second_observation()
+            if fits_alike or m.value.correlation > _RIGHT_VALUES:
+                return True
         # The first values of a right program pass those with an index. But they learn actions.
         by_chance = _BY_CHANCE if m.task.never_terminates else _BY_CHANCE_OF_TWO
         if equation.variant == "index-for-value" and m.advantage.correlation > by_chance:
@@ -108,18 +123,16 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
             return acts_as_stored()
         return equation.name == "other-gravity"  # the transitions have shown which one acted
 
-    if not m.task.never_terminates:  # there are hundreds of observations, so they come last
+    if ends:  # there are hundreds of observations, so they come last
         agreements = sorted(agreements, key=lambda item: item[1].name == "observation-map")
     for own, equation in agreements:
-        if is_refuted(equation):
-            continue
-        if not equation.explains(own, right, not m.task.never_terminates):
+        if is_refuted(own, equation) or not equation.explains(own, right, ends):
             continue
         if is_short_training(equation):
             continue
         repair = _repair(m, equation)
         # A network that sees CartPole wrongly may have learned too little to balance with a repair.
-        proven = not m.task.never_terminates and (
+        proven = ends and (
             (equation.name == "torque-map" and right.correlation < -0.6)
             or (own.error < 0.15 and own.correlation > 0.9 and right.correlation < 0.5)
         )

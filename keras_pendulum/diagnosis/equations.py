@@ -28,7 +28,6 @@ from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.diagnosis.target_equations import TARGETS
 
-_FOUND_WITH_ENDS = ("same-state", "negative-next")  # by `constant_futures_with_ends`
 _GRAVITIES = (0.0, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0)  # m/s²
 _DISCOUNTS = (0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
 
@@ -46,7 +45,8 @@ def agreements(visited: Visited, declared: Backup) -> Iterator[tuple[Agreement, 
         for each in (constant_futures_with_ends if ends else constant_futures)(declared)
         if each.offset
     )
-    equations = [each for each in TARGETS if not ends or each.variant not in _FOUND_WITH_ENDS]
+    # With ends, `constant_futures_with_ends` finds it.
+    equations = [each for each in TARGETS if not (ends and each.variant == "same-state")]
     for equation in (*equations, *found, *_changes(visited, declared)):
         values = visited.backup(**equation.change) if equation.change else declared
         yield agreement(values, equation.target(values)), equation

@@ -26,6 +26,7 @@ _SHARE = 0.7  # of the error of the right equation
 _SHARE_OF_BOTH = 0.9  # the same where one step fits better, too, and advantages have been learned
 _LEARNED = 0.4  # correlation of the advantages
 _SHARE_OF_SECOND = 0.95  # of that of the next best equation, in both errors together
+_CLEAR_SHARE = 0.6  # of the error of the right equation: then one of these, even if two fit alike
 _NEARLY = 1.03  # times the lowest error of one step
 _LOWER = -0.25  # spreads: how much lower the values are than those of the greedy policy
 
@@ -55,7 +56,7 @@ def followed_policy(m: Measurement) -> Finding | None:
     fits = one_step < equation.share * m.right_agreement.error
     learned = m.right_agreement.correlation > _LEARNED
     share = _SHARE_OF_BOTH if fits and learned else _SHARE
-    if both[equation] > _SHARE_OF_SECOND * both[second]:
+    if both[equation] > _SHARE_OF_SECOND * both[second] and own > _CLEAR_SHARE * right.error:
         return None
     best_of_one_step = min(m.equation_errors[each.formula] for each in errors)
     # Over ten steps, the mean of random actions smooths the network's own errors, too.

@@ -40,9 +40,10 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         prog=prog,
         description="Drive the pendulum or CartPole by hand; --against then shows a policy on the "
         "same start.",
-        epilog="Keys: j or left -2 N·m (CartPole: push left), l or right +2 (push right), k or "
-        "down 0 (pushes alternate); h switches between keys that act until the next one and while "
-        "they are held; r restarts, ESC leaves.",
+        epilog="Keys of the pendulum: j or right -2 N·m, l or left +2, k, down or up 0. Keys of "
+        "CartPole: j or left pushes left, l or right pushes right; with k, down or up the pushes "
+        "alternate. h switches between keys that act until the next one and while they are held; "
+        "Enter or Space continues, r restarts, ESC leaves.",
     )
     add_environment_flag(parser)
     parser.add_argument(
@@ -57,7 +58,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         "--against",
         type=nonempty_path,
         metavar="WEIGHTS.h5",
-        help="a file, or the name of a shipped one: its policy drives after you",
+        help="a file, the name of a shipped one or a run folder: its policy drives after you",
     )
     add_activation_flag(parser)
     parser.add_argument(
