@@ -27,7 +27,8 @@ _LIKE_FEW_STEPS = 0.1  # error of the rewards of a few steps that leaves no doub
 _BY_CHANCE = 0.4  # correlation of advantages that have not been learned
 _BY_CHANCE_OF_TWO = 0.2  # the same of the two actions of CartPole
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
-_CLEARLY_BEST = 0.85  # share of the next best error that an observation may have
+_CLEARLY_BEST = 0.9  # share of the error of other observations that one has at most
+_ALIKE = 0.15  # less correlation of the advantages: then another observation fits as well
 _DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
 HEALTHY = f"{RIGHT} to 1 to 7 %"
 
@@ -70,14 +71,21 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
     agreements, ends = m.agreements, not m.task.never_terminates
 
     @cache
-    def second_observation() -> float:
-        """Returns the second lowest error of the observations that explain the values."""
-        errors = [
-            own.error
+    def observations() -> list[Agreement]:
+        return [
+            own
             for own, equation in agreements
             if equation.name == "observation-map" and equation.explains(own, right, ends)
         ]
-        return sorted([*errors, np.inf, np.inf])[1]
+
+    def fits_by_chance(own: Agreement) -> bool:
+        """Returns whether another observation explains the values about as well, too."""
+        return any(
+            other is not own
+            and other.error < own.error / _CLEARLY_BEST
+            and other.correlation > own.correlation - _ALIKE
+            for other in observations()
+        )
 
     @cache
     def acts_as_stored() -> bool:
@@ -105,14 +113,13 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
         if m.excess > _DIVERGED and equation.variant != "frozen-target":
             return True
         if equation.name == "observation-map":
-            # There are many, so some fit by chance, and then about as well as each other. In
-            # CartPole, several fit alike also where the observation is wrong.
-            fits_alike = not ends and own.error > _CLEARLY_BEST * second_observation()
-            if fits_alike or m.value.correlation > _RIGHT_VALUES:
+            # There are many, so some fit by chance. In CartPole, several fit alike in any case.
+            by_chance = not ends and fits_by_chance(own)
+            if by_chance or m.value.correlation > _RIGHT_VALUES:
                 return True
         # The first values of a right program pass those with an index. But they learn actions.
-        by_chance = _BY_CHANCE if m.task.never_terminates else _BY_CHANCE_OF_TWO
-        if equation.variant == "index-for-value" and m.advantage.correlation > by_chance:
+        not_learned = _BY_CHANCE_OF_TWO if ends else _BY_CHANCE
+        if equation.variant == "index-for-value" and m.advantage.correlation > not_learned:
             return True
         # The values of a few steps, which a short training has, obey one with smaller rewards.
         if equation.slope is not None and m.value.slope > _OTHER_SLOPE * equation.slope:

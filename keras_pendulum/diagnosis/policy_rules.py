@@ -27,6 +27,7 @@ _SHARE_OF_BOTH = 0.9  # the same where one step fits better, too, and advantages
 _LEARNED = 0.4  # correlation of the advantages
 _SHARE_OF_SECOND = 0.95  # of that of the next best equation, in both errors together
 _CLEAR_SHARE = 0.6  # of the error of the right equation: then one of these, even if two fit alike
+_POSITION = (0.6, 1.28)  # of the values on the way from the right targets, 0, to its own, 1
 _NEARLY = 1.03  # times the lowest error of one step
 _LOWER = -0.25  # spreads: how much lower the values are than those of the greedy policy
 
@@ -51,12 +52,19 @@ def followed_policy(m: Measurement) -> Finding | None:
     both = {
         each: (m.equation_errors[each.formula] * error) ** 0.5 for each, error in errors.items()
     }
-    equation, second = sorted(both, key=both.__getitem__)[:2]
+    # Values between the right targets and those of the mean, or beyond them, are of another target.
+    position = {each.formula: own.position for own, each in m.agreements}
+    low, high = _POSITION
+    near = [each for each in both if low < position[each.formula] < high]
+    if not near:
+        return None
+    equation, *others = sorted(near, key=both.__getitem__)
     own, one_step = errors[equation], m.equation_errors[equation.formula]
     fits = one_step < equation.share * m.right_agreement.error
     learned = m.right_agreement.correlation > _LEARNED
     share = _SHARE_OF_BOTH if fits and learned else _SHARE
-    if both[equation] > _SHARE_OF_SECOND * both[second] and own > _CLEAR_SHARE * right.error:
+    is_clear = not others or both[equation] <= _SHARE_OF_SECOND * both[others[0]]
+    if not is_clear and own > _CLEAR_SHARE * right.error:
         return None
     best_of_one_step = min(m.equation_errors[each.formula] for each in errors)
     # Over ten steps, the mean of random actions smooths the network's own errors, too.

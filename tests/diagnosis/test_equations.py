@@ -265,6 +265,24 @@ def test_mean_of_the_next_values_must_fit_one_step_best_too(
     assert followed_policy(m) is None
 
 
+@pytest.mark.parametrize(("position", "variant"), [(1.0, "mean-next"), (1.7, "min-next")])
+def test_values_beyond_those_of_the_mean_are_of_another_target(
+    position: float, variant: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the lowest next value are as far beyond the mean as the mean is from the highest."""
+    m = diagnose(rough(TARGETS["wrong-target (min-next)"], 3, 4)).measurement
+    agreements = [
+        (own._replace(position=position if each.variant == "mean-next" else 1.0), each)
+        for own, each in m.agreements
+    ]
+    errors = m.equation_errors | {"r + γ·mean Q(s′, ·)": 0.01}  # so it fits best
+    monkeypatch.setitem(m.__dict__, "agreements", agreements)
+    monkeypatch.setitem(m.__dict__, "equation_errors", errors)
+    finding = followed_policy(m)
+    found = None if finding is None else finding.variant
+    assert found == variant
+
+
 @pytest.mark.parametrize(("clear", "named"), [(0.6, True), (0.1, False)])
 def test_one_of_two_targets_that_fit_alike_is_named_where_the_right_one_fits_far_worse(
     clear: float, named: bool, monkeypatch: pytest.MonkeyPatch
@@ -276,6 +294,8 @@ def test_one_of_two_targets_that_fit_alike_is_named_where_the_right_one_fits_far
     one_step, steps = m.equation_errors, finding.long_errors
     alike = 1.01 * one_step[lowest] * steps[lowest] / steps[last]
     monkeypatch.setitem(m.__dict__, "equation_errors", one_step | {last: alike})
+    positions = [(own._replace(position=1.0), each) for own, each in m.agreements]
+    monkeypatch.setitem(m.__dict__, "agreements", positions)
     monkeypatch.setattr(policy_rules, "_CLEAR_SHARE", clear)
     assert (followed_policy(m) is not None) is named
 
