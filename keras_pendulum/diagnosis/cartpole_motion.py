@@ -33,7 +33,7 @@ class CartPoleMotion(Motion):
         cls, dynamics: KnownDynamics, before: Array, action: NDArray[Any], after: Array
     ) -> bool:
         """Returns whether one of the pushes leads to nearly each next state."""
-        efforts = dynamics.all_efforts(dynamics.task.actions())
+        efforts = dynamics.efforts(dynamics.task.actions().values)
         errors = _errors(dynamics, before[-1000:], after[-1000:], efforts)
         return bool(np.mean(errors.min(axis=1) < _SAME_STATE) >= 0.95)
 

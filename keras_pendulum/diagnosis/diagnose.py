@@ -97,7 +97,7 @@ def diagnose(
             f"{policy.name} belongs to {task.environment}; diagnose is for {' and '.join(TASKS)}"
         )
     if folder is None:
-        outputs = None if policy.actions is None else dynamics.all_efforts(policy.actions)
+        outputs = None if policy.actions is None else dynamics.efforts(policy.actions.values)
         run = make_record(record, transitions, outputs, dynamics)
     else:
         run = read_record(folder)

@@ -195,15 +195,16 @@ def growth_everywhere(m: Measurement) -> Finding | None:
 
 def not_converged(m: Measurement) -> Finding | None:
     """Says that the values obey no equation yet."""
-    if m.obeys_right_equation:
+    right = m.right_agreement
+    if right.error < 0.1 and right.correlation > 0.5:  # near the fixed point of the right equation
         return None
     evidence = (
-        f"the values satisfy {RIGHT} to {percent(m.right_agreement.error)}, and no other equation "
+        f"the values satisfy {RIGHT} to {percent(right.error)}, and no other equation "
+        f"clearly better; correlation of the advantages {right.correlation:.2f}"
     )
-    evidence += f"clearly better; correlation of the advantages {m.right_agreement.correlation:.2f}"
     if m.task.never_terminates and m.finite:
         few = few_steps(m)
-        if few.error < min(_LIKE_FEW_STEPS, 0.3 * m.right_agreement.error):
+        if few.error < min(_LIKE_FEW_STEPS, 0.3 * right.error):
             evidence += f"; the values are the rewards of {few.steps} steps to "
             evidence += f"{percent(few.error)}, so few copies of the target network were made"
     return Finding("not-converged", evidence, f"{HEALTHY}; above 0.7")

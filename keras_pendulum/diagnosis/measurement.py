@@ -80,11 +80,6 @@ class Measurement(PlayedAgent):
             errors.setdefault(equation.formula, own.error)
         return errors
 
-    @property
-    def obeys_right_equation(self) -> bool:
-        """Whether the values are near the fixed point of the right equation."""
-        return self.right_agreement.error < 0.1 and self.right_agreement.correlation > 0.5
-
     @cached_property
     def learned_q(self) -> Array:
         """The learned Q-values [N, A] at `states`."""

@@ -19,7 +19,7 @@ from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.policy import Observations, Policy
 from keras_pendulum.optimum.known_dynamics import KnownDynamics, Table
-from keras_pendulum.optimum.solutions import solution
+from keras_pendulum.optimum.solutions import known_dynamics
 
 STARTS = 60  # seeds 0, 1, …
 
@@ -43,15 +43,13 @@ class PlayedAgent:
     @cached_property
     def dynamics(self) -> KnownDynamics:
         """The dynamics of the task, and its exact values."""
-        found = solution(self.task)
-        assert isinstance(found, KnownDynamics)
-        return found
+        return known_dynamics(self.task)
 
     @property
     def efforts(self) -> Array:
         """The efforts [A] of the outputs in N·m or N; without outputs, those of the record."""
         if self.policy.actions is not None:
-            return self.dynamics.all_efforts(self.policy.actions)
+            return self.dynamics.efforts(self.policy.actions.values)
         assert self.record is not None and self.record.own_efforts is not None
         return self.record.own_efforts
 

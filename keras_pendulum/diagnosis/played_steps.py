@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.record_observations import find_change
+from keras_pendulum.diagnosis.record_observations import undo_change
 from keras_pendulum.diagnosis.record_sources import read_actions
 from keras_pendulum.diagnosis.recorded_steps import Steps
 from keras_pendulum.diagnosis.signals import Array, nearest
@@ -37,12 +37,7 @@ class PlayedSteps(NamedTuple):
         Raises ConfigError as `read_actions` does.
         """
         indices, effort = read_actions(steps.action, efforts, "record")
-        change = find_change(
-            dynamics, steps.observation, steps.action, steps.next_observation, "record"
-        )
-        steps = steps._replace(
-            observation=steps.observation @ change, next_observation=steps.next_observation @ change
-        )
+        steps = undo_change(dynamics, steps, "record")
         if effort is None:
             assert efforts is not None
             effort = efforts[indices]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from keras_pendulum.diagnosis.equation import RIGHT, NextAction
+from keras_pendulum.diagnosis.equation import RIGHT, Equation, NextAction
 from keras_pendulum.diagnosis.equation_rules import HEALTHY, RIGHT_ERROR, obeyed_equation, percent
 from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
@@ -52,18 +52,26 @@ def followed_policy(m: Measurement) -> Finding | None:
     both = {
         each: (m.equation_errors[each.formula] * error) ** 0.5 for each, error in errors.items()
     }
-    # Values between the right targets and those of the mean, or beyond them, are of another target.
     position = {each.formula: own.position for own, each in m.agreements}
     low, high = _POSITION
-    near = [each for each in both if low < position[each.formula] < high]
-    if not near:
+    lowest = next(each for each in both if each.variant == "min-next")
+
+    def equation_of(nearest: Equation) -> Equation | None:
+        """Returns the equation whose values these are; those beyond the mean are the lowest."""
+        place = position[nearest.formula]
+        if low < place < high:
+            return nearest
+        return lowest if place >= high and nearest.variant == "mean-next" else None
+
+    near = sorted(filter(equation_of, both), key=both.__getitem__)
+    if not near or (equation := equation_of(near[0])) is None:
         return None
-    equation, *others = sorted(near, key=both.__getitem__)
-    own, one_step = errors[equation], m.equation_errors[equation.formula]
+    others = [each for each in near if equation_of(each) is not equation]
+    own, one_step = errors[near[0]], m.equation_errors[near[0].formula]
     fits = one_step < equation.share * m.right_agreement.error
     learned = m.right_agreement.correlation > _LEARNED
     share = _SHARE_OF_BOTH if fits and learned else _SHARE
-    is_clear = not others or both[equation] <= _SHARE_OF_SECOND * both[others[0]]
+    is_clear = not others or both[near[0]] <= _SHARE_OF_SECOND * both[others[0]]
     if not is_clear and own > _CLEAR_SHARE * right.error:
         return None
     best_of_one_step = min(m.equation_errors[each.formula] for each in errors)
@@ -73,9 +81,11 @@ def followed_policy(m: Measurement) -> Finding | None:
     if own > min(_LARGEST_ERROR, share * right.error):
         return None
     evidence = (
-        f"over {_STEPS} steps, the values satisfy {equation.formula} to {percent(own)} and "
+        f"over {_STEPS} steps, the values satisfy {near[0].formula} to {percent(own)} and "
         f"{RIGHT} to {percent(right.error)}"
     )
+    if equation is not near[0]:
+        evidence += "; in one step, they are lower than both"
     text = Fault(equation.explanation, equation.remedy)
     long_errors = {RIGHT: right.error} | {
         each.formula: errors[each] for each in sorted(errors, key=errors.__getitem__)

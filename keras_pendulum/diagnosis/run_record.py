@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.diagnosis.played_steps import PlayedSteps
-from keras_pendulum.diagnosis.record_observations import find_change
+from keras_pendulum.diagnosis.record_observations import undo_change
 from keras_pendulum.diagnosis.record_sources import read_actions, steps_of, transitions_of
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.dqn.replay_buffer import Transitions
@@ -53,10 +53,7 @@ def make_record(
         stored, name = Transitions(*played.steps[:5]), "record"
     else:
         stored, name = transitions_of(transitions, dynamics.task), "transitions"
-    change = find_change(dynamics, stored.observation, stored.action, stored.next_observation, name)
-    stored = stored._replace(
-        observation=stored.observation @ change, next_observation=stored.next_observation @ change
-    )
+    stored = undo_change(dynamics, stored, name)
     indices, effort = read_actions(np.asarray(stored.action), efforts, name)
     own = None
     if efforts is None:

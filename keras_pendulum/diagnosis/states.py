@@ -96,7 +96,7 @@ def training_states(table: Table, exact: KnownDynamics, discount: float, starts:
     def greedy(observations: NDArray[np.float32]) -> Array:
         return exact.greedy_efforts(table, discount, exact.states_of(observations))
 
-    efforts = exact.all_efforts(exact.task.actions())
+    efforts = exact.efforts(exact.task.actions().values)
     return _explored(greedy, efforts, exact, starts, np.random.RandomState(1), _STATES)
 
 

@@ -22,7 +22,6 @@ class Exercise(NamedTuple):
     solution: str  # the third hint
 
 
-_GOAL = "goal = r + DISCOUNT * (1 - ended) * next_value"
 _NEXT = "tf.reduce_max(target(next_s), axis=1)"
 _VALUE = "tf.gather(online(s), a, batch_dims=1)"
 _LOSS = "(goal - value) ** 2"

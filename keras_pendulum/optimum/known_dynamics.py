@@ -8,7 +8,6 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.actions import Actions
 from keras_pendulum.optimum.solution import Array, Solution
 
 Table = NDArray[np.float32]
@@ -51,10 +50,6 @@ class KnownDynamics(Solution):
     @abstractmethod
     def efforts(self, actions: NDArray[Any]) -> Array:
         """Returns the efforts [N] of actions as the environment takes them."""
-
-    def all_efforts(self, actions: Actions) -> Array:
-        """Returns the efforts [A] of all actions."""
-        return self.efforts(actions.values)
 
     @abstractmethod
     def outcomes(self, states: Array, efforts: Array) -> Outcomes:

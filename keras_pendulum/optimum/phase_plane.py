@@ -55,7 +55,7 @@ def run_phase_planes(network: DQN, config: Config) -> dict[str, PhasePlane]:
 def network_phase_plane(network: DQN, task: Task, reward_scale: float = 1.0) -> PhasePlane:
     """Returns the greedy efforts of a Q-network, and its values divided by the `reward_scale`."""
     dynamics, policy = known_dynamics(task), greedy_policy(network)
-    efforts = dynamics.all_efforts(task.actions(network.action_count))
+    efforts = dynamics.efforts(task.actions(network.action_count).values)
     # One row at a time, which needs little memory.
     q = np.array([policy.q_values(dynamics.observe(row)) for row in _rows(dynamics)])
     return PhasePlane(efforts[q.argmax(axis=2)], q.max(axis=2) / reward_scale, dynamics)
@@ -67,7 +67,7 @@ def optimal_phase_plane(task: Task, discount: float) -> PhasePlane:
     The policy for a discount below 1 need not attain the highest return.
     """
     dynamics = known_dynamics(task)
-    efforts, rows = dynamics.all_efforts(task.actions()), _rows(dynamics)
+    efforts, rows = dynamics.efforts(task.actions().values), _rows(dynamics)
     if isinstance(task, Pendulum):
         table = _coarse_table(task, discount)
     else:

@@ -23,8 +23,7 @@ SOLUTIONS: dict[str, Any] = {  # classes that take the task
 
 def solution(task: Task) -> Solution:
     """Returns the solution of a task."""
-    found: Solution = SOLUTIONS[task.environment](task)
-    return found
+    return SOLUTIONS[task.environment](task)
 
 
 def known_dynamics(task: Task) -> KnownDynamics:

@@ -132,7 +132,7 @@ def read_arrays(file: H5File, group: str) -> Iterator[tuple[str, NDArray[Any]]]:
 
 
 def history_arrays(history: list[EpisodeRecord]) -> dict[str, NDArray[np.float64]]:
-    """Returns the arrays of the group `run` that `read_history` reads."""
+    """Returns the arrays of the group `run` that `_read_history` reads."""
     arrays = {"history": np.array([record[:-1] for record in history], np.float64)}
     evaluations = [
         (record.episode, record.greedy_regret)
