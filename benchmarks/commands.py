@@ -47,7 +47,7 @@ COMMANDS = (
     Command("learning.preset_results", 3, results=("quality",), packages=("psutil",), needed=True),
     Command("learning.study", 20, (FOLDER,), packages=("scipy", "distributed"), needed=True),
     Command("learning.departures", 90, ("swingup",), ("departures_swingup",), ("scipy",)),
-    Command("learning.departures", 35, ("cartpole", "20"), ("departures_cartpole",), ("scipy",)),
+    Command("learning.departures", 20, ("cartpole",), ("departures_cartpole",), ("scipy",)),
     Command("learning.rejected_settings", 7, results=("choosing",), packages=("scipy",)),
     Command("learning.last_regret", 4, ("reference",), ("last_regret_reference",), ("scipy",)),
     Command("learning.last_regret", 11, ("swingup", "4"), ("last_regret_swingup",), ("scipy",)),
@@ -84,7 +84,7 @@ COMMANDS = (
     Command("diagnosis.single_faults", 10, (FOLDER,), ("diagnosis",)),
     Command(
         "diagnosis.strangers",
-        100,
+        90,
         (FOLDER, "Pendulum-v1"),
         ("diagnosis_strangers",),
         ("torch",),

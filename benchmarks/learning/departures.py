@@ -6,7 +6,7 @@
 and the later one without each of its departures, with the training seeds 0, 1, … (10 seeds), two
 runs at a time. Writes the greedy regrets on the starts of seeds 0 to 99, of CartPole on those of 0
 to 999, with their interquartile mean. With ROWs, such as `discount`, it trains only these and keeps
-the other rows of the last results. On two cores, `cartpole` takes half an hour and `swingup` one
+the other rows of the last results. On two cores, `cartpole` takes 20 minutes and `swingup` an hour
 and a half. `reference` departs from `original`: its rows are arms of the study, so
 `benchmarks.learning.study` trains them.
 """

@@ -14,6 +14,7 @@ from test_floor_plan import imports
 from benchmarks.commands import COMMANDS as LISTED
 from benchmarks.commands import Command
 from benchmarks.diagnosis.healthy_networks import COUNTS
+from benchmarks.diagnosis.strangers import ROUNDS
 
 BENCHMARKS = ROOT / "benchmarks"
 MODULES = {
@@ -131,9 +132,9 @@ def test_command_trains_with_at_most_ten_seeds_by_default(module: str) -> None:
             names = [argument.arg for argument in node.args.args]
             defaults = node.args.defaults
             for name, default in zip(names[len(names) - len(defaults) :], defaults, strict=True):
-                if name in ("seeds", "rounds"):
+                if name in ("seeds", "rounds") and ast.literal_eval(default) is not None:
                     assert int(ast.literal_eval(default)) <= 10
 
 
-def test_healthy_networks_have_at_most_ten_seeds() -> None:
-    assert max(COUNTS.values()) <= 10
+def test_networks_to_diagnose_have_at_most_ten_seeds() -> None:
+    assert max(*COUNTS.values(), *ROUNDS.values()) <= 10
