@@ -393,6 +393,17 @@ def test_target_network_that_is_never_copied_is_named_with_small_rewards(
     assert first(diagnose(q_values, reward_scale=scale)) == "wrong-target (frozen-target)"
 
 
+@pytest.mark.parametrize(("level", "shown"), [(0.0, True), (1000.0, False)])
+def test_values_above_zero_are_not_those_of_smaller_rewards(
+    level: float, shown: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Backup, "reward_factor", 0.03)  # the one that fits best
+    values = fixed_point(right)
+    diagnosis = diagnose(lambda o: values(o) + level)
+    formulas = [each.formula for _, each in diagnosis.measurement.agreements]
+    assert ("0.03·r + γ·max Q(s′, ·)" in formulas) is shown
+
+
 def named_futures(added: Any, next_q: Any, seen: Any) -> set[str]:
     """Returns the names of the equations that Q - r = `added` [N, A] shows."""
     reward = np.random.RandomState(1).uniform(-16, 0, added.shape)
