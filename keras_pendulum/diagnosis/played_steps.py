@@ -14,12 +14,22 @@ from keras_pendulum.diagnosis.signals import Array, nearest
 from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
 PARTS = 10  # of the run, for the share of random actions
+BEGINNING = 200  # steps: an episode of the pendulum
 _ROWS, _COMPARED = 4000, 500  # the last rows of a part, and how many of them are compared
 _CLOSE = 0.5  # N·m or N, between efforts that count as the same
 _SAME_TIME = 25  # steps, in which similar states follow each other
 _AS_RANDOM = 0.77  # above: efforts in similar states differ nearly as random ones do
 _HELD = 0.1  # below: hardly any effort differs from those before and after it
+_DEALT = 20  # successive steps of a half
 _LEVELS = np.linspace(-2, 2, 9)  # N·m, for an agent without outputs
+
+
+class RandomShares(NamedTuple):
+    """About the share of random actions in parts of a run."""
+
+    tenths: Array  # [10]
+    beginning: float  # of the first 200 steps
+    lasting: float  # of the first 200 steps, if a random action lasts for some steps
 
 
 class PlayedSteps(NamedTuple):
@@ -43,8 +53,8 @@ class PlayedSteps(NamedTuple):
             effort = efforts[indices]
         return cls(steps, effort, _LEVELS if efforts is None else efforts, dynamics)
 
-    def random_shares(self) -> Array | None:
-        """Returns about the share of random actions in each tenth of the run; None if short.
+    def random_shares(self) -> RandomShares | None:
+        """Returns about the share of random actions in parts of the run; None if it is short.
 
         A greedy policy gives similar efforts in similar states and in the steps before and after,
         and some efforts more often than others. Random ones do neither. Each of the four
@@ -53,11 +63,17 @@ class PlayedSteps(NamedTuple):
         order = np.argsort(self.steps.time, kind="stable")
         if len(order) < 100 * PARTS:
             return None
-        return np.array(
-            [self._random_share(np.sort(rows[-_ROWS:])) for rows in np.array_split(order, PARTS)]
-        )
+        parts = [np.sort(rows[-_ROWS:]) for rows in np.array_split(order, PARTS)]
+        lasts = not any(self._lone_share(rows) for rows in parts)
+        tenths = np.array([min(self._shares(rows, lasts)) for rows in parts])
+        beginning = self._shares(np.sort(order[:BEGINNING]), lasts)
+        return RandomShares(tenths, min(beginning), beginning[0])
 
-    def _random_share(self, rows: NDArray[np.intp]) -> float:
+    def _shares(self, rows: NDArray[np.intp], lasts: bool) -> tuple[float, float]:
+        """Returns two upper bounds; only the first one is valid if an action lasts for some steps.
+
+        `lasts` says whether each action of the run does.
+        """
         effort, levels = self.effort[rows], self.levels
         chance = float(np.mean(np.abs(levels[:, None] - levels) <= _CLOSE))
         compared = np.random.RandomState(0).permutation(len(rows))[:_COMPARED]
@@ -72,9 +88,9 @@ class PlayedSteps(NamedTuple):
 
         in_states = share(np.abs(effort[compared] - effort[closest]))
         bound, lone = min(in_states, self._rare_share(rows)), self._lone_share(rows)
-        if in_states > _AS_RANDOM and lone < _HELD:  # random actions that last for several steps
-            return bound
-        return min(bound, lone, share(np.abs(np.diff(effort)[follows])))
+        if lasts or (in_states > _AS_RANDOM and lone < _HELD):
+            return bound, bound
+        return bound, min(lone, share(np.abs(np.diff(effort)[follows])))
 
     def _lone_share(self, rows: NDArray[np.intp]) -> float:
         """Returns the share of random actions, were all random that differ from both neighbours.
@@ -95,12 +111,14 @@ class PlayedSteps(NamedTuple):
     def _rare_share(self, rows: NDArray[np.intp]) -> float:
         """Returns the share of random actions, were all efforts as frequent as the rare half.
 
-        The steps are dealt to two halves. One shows which efforts are rare, and the other how
-        often they are: in the same steps, the rarest ones are rarer than they should be.
+        The steps are dealt to two halves, a few at a time: a random action that lasts belongs to
+        one. A half shows which efforts are rare, and the other one how often they are: in the same
+        steps, the rarest ones are rarer than they should be.
         """
         count = len(self.levels)
         number = nearest(self.effort[rows], self.levels)
-        halves = [np.bincount(number[first::2], minlength=count) for first in (0, 1)]
+        half = np.arange(len(rows)) // _DEALT % 2
+        halves = [np.bincount(number[half == each], minlength=count) for each in (0, 1)]
         rare = [np.argsort(half, kind="stable")[: (count + 1) // 2] for half in halves]
         both = halves[0][rare[1]].mean() + halves[1][rare[0]].mean()
         return float(both * count / len(rows))

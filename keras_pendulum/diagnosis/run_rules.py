@@ -9,11 +9,12 @@ import numpy as np
 
 from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
-from keras_pendulum.diagnosis.played_steps import PARTS
+from keras_pendulum.diagnosis.played_steps import BEGINNING, PARTS
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.stored_states import OLD_STATE
 
 _LOW = 0.08  # random actions that an ε of 0.1 shows at least
+_FALLS = 0.3  # above: the run begins with random actions, also where each lasts for some steps
 _LONG_RUN = 4000  # steps: 20 episodes of the pendulum
 
 
@@ -61,19 +62,23 @@ def exploration(m: Measurement) -> Finding | None:
         return None
     if r.played is None or r.steps is None or (shares := r.played.random_shares()) is None:
         return None
-    first, last, is_long = float(shares[0]), float(shares[-2:].mean()), r.steps >= _LONG_RUN
+    tenths, is_long = shares.tenths, r.steps >= _LONG_RUN
+    last = float(tenths[-2:].mean())
     # A program that is stopped early has random actions at its end, too, but not more of them.
-    if last > 0.7 and (is_long or last > float(shares[:2].mean()) + 0.3):
+    if last > 0.7 and (is_long or last > float(tenths[:2].mean()) + 0.3):
         evidence = f"about {last:.0%} of the actions of the last fifth are random"
         return Finding("exploration", evidence, "below 10 %")
-    # Many programs learn with a constant ε of 0.1, and in some ε falls within a tenth of the run.
-    begin, low = "the first tenth", first
-    if is_long and m.task.never_terminates and first < 0.25:
-        begin, low = "one of the first tenths", float(shares[:3].min())
-    limit = _LOW - 3 * (_LOW * (1 - _LOW) * PARTS / r.steps) ** 0.5  # three standard deviations
-    if low < limit and len(r.played.effort) == r.steps:
-        evidence = f"about {low:.0%} of the actions of {begin} of the run are random"
-        return Finding("exploration", evidence, "above 10 %")
+    if shares.lasting > _FALLS or len(r.played.effort) < r.steps:
+        return None
+    # Many programs learn with a constant ε of 0.1.
+    begin, low = "the first tenth of the run", float(tenths[0])
+    if is_long and m.task.never_terminates:
+        begin, low = "one of the first tenths of the run", float(tenths[:3].min())
+    first = f"the first {BEGINNING} steps"
+    for part, share, count in (begin, low, r.steps // PARTS), (first, shares.beginning, BEGINNING):
+        if share < _LOW - 3 * (_LOW * (1 - _LOW) / count) ** 0.5:  # three standard deviations
+            evidence = f"about {share:.0%} of the actions of {part} are random"
+            return Finding("exploration", evidence, "above 10 %")
     return None
 
 

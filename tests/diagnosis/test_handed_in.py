@@ -380,17 +380,39 @@ def test_low_epsilon_is_seen_where_the_policy_changes(epsilon: float, shown: boo
     assert (first(run) == "exploration") is shown
 
 
-def test_random_actions_may_be_held_for_some_steps() -> None:
+@pytest.mark.parametrize(("epsilon", "shown"), [(0.0, True), (0.12, False)])
+def test_low_epsilon_is_seen_before_the_policy_changes(epsilon: float, shown: bool) -> None:
+    steps, random = count(), np.random.RandomState(1)
+    act = lambda o: random.choice(TORQUES) if 200 < next(steps) < 900 else swing_up(o)  # noqa: E731
+    run = record_run(act, episodes=15, epsilon=lambda done: epsilon)
+    assert (first(run) == "exploration") is shown
+
+
+@pytest.mark.parametrize("falls", [700, 4000])  # steps
+def test_random_actions_may_be_held_for_some_steps(falls: int) -> None:
     steps, random, held = count(), np.random.RandomState(1), [0.0]
 
     def act(observation: Any) -> float:
         step = next(steps)
         if step % 6 == 0:
-            explores = random.random_sample() < 1 - step / 4000
+            explores = random.random_sample() < 1 - step / falls
             held[0] = random.choice(TORQUES) if explores else np.nan
         return swing_up(observation) if np.isnan(held[0]) else held[0]
 
     assert first(record_run(act, episodes=40, epsilon=lambda done: 0)) == "nothing"
+
+
+@pytest.mark.parametrize("epsilon", [0.12, 0.3])
+def test_each_action_may_last_for_some_steps(epsilon: float) -> None:
+    steps, random, held = count(), np.random.RandomState(1), [0.0]
+
+    def act(observation: Any) -> float:
+        if next(steps) % 4 == 0:
+            explores = random.random_sample() < epsilon
+            held[0] = random.choice(TORQUES) if explores else swing_up(observation)
+        return held[0]
+
+    assert first(record_run(act, epsilon=lambda done: 0)) != "exploration"
 
 
 def test_record_may_be_a_file_and_on_the_command_line(
