@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -31,6 +32,15 @@ class WeightsError(UserError, ValueError):
 
 class UnknownLayersError(WeightsError):
     """A network that is not a chain of Dense layers."""
+
+
+@contextlib.contextmanager
+def report_os_error(problem: str) -> Iterator[None]:
+    """Raises UserError with the problem and its reason for an OSError in the `with` block."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{problem}: {error.strerror or error}") from error
 
 
 def require_type(name: str, value: object, expected: type | tuple[type, ...]) -> None:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, report_os_error
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
 
 LARGEST_RECORD = 200_000  # steps
@@ -61,13 +61,13 @@ def read_steps(path: str) -> Steps:
 
     Raises UserError for a file that is missing, damaged, too large, or of another kind.
     """
-    try:
-        with open(path, "rb", opener=_open_without_waiting) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise UserError(f"{path} is not a file; expected the file of a recorder")
-            content = file.read(_LARGEST_FILE + 1)
-    except OSError as error:
-        raise UserError(f"cannot read {path}: {error.strerror}") from error
+    with (
+        report_os_error(f"cannot read {path}"),
+        open(path, "rb", opener=_open_without_waiting) as file,
+    ):
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise UserError(f"{path} is not a file; expected the file of a recorder")
+        content = file.read(_LARGEST_FILE + 1)
     if len(content) > _LARGEST_FILE:
         raise UserError(f"{path} is larger than {_LARGEST_FILE >> 20} MiB, the limit of a record")
     try:

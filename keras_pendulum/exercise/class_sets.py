@@ -7,7 +7,7 @@ import random
 from collections import Counter
 from pathlib import Path
 
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, report_os_error
 from keras_pendulum.exercise.hints import key_line
 from keras_pendulum.exercise.program import exercise, program
 from keras_pendulum.exercise.table import EXERCISES
@@ -59,7 +59,7 @@ def write_class(students: int, each: int, seed: int, folder: Path) -> None:
     system refuses.
     """
     sets = deal(students, each, seed)
-    try:
+    with report_os_error(f"cannot write {folder}"):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise UserError(f"{folder} exists and is not an empty folder: name another one")
         for number, exercises in enumerate(sets, 1):
@@ -69,8 +69,6 @@ def write_class(students: int, each: int, seed: int, folder: Path) -> None:
                 path = own / f"exercise_{each_number:02}.py"
                 write_atomically(path, program(each_number).encode())
             write_atomically(own / "tasks.txt", _tasks(exercises).encode())
-    except OSError as error:
-        raise UserError(f"cannot write {folder}: {error.strerror}") from error
     write_atomically(folder / KEY, _key(sets, seed).encode())
 
 

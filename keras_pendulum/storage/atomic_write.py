@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, report_os_error
 
 _RETRIES, _SECONDS_BETWEEN = 40, 0.05  # 2 s in all
 _Result = TypeVar("_Result")
@@ -37,7 +37,7 @@ def write_atomically(
     target = Path(os.path.realpath(path))
     # Short, because systems limit the length of a name, and Windows that of a path.
     temporary = target.with_name(f".{target.name[:60]}.{uuid.uuid4().hex[:8]}.tmp")
-    try:
+    with report_os_error(f"cannot write {path}"):
         if Path(path).exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "a device, a pipe or a socket"
             raise OSError(None, f"it is {kind}; name a file")
@@ -51,8 +51,6 @@ def write_atomically(
         finally:
             with contextlib.suppress(OSError):  # it is gone, or the error above says more
                 temporary.unlink()
-    except OSError as error:
-        raise UserError(f"cannot write {path}: {error.strerror or error}") from error
     with contextlib.suppress(OSError):  # the new file is in place, and not every system can do it
         _flush_folder(target.parent)
 
@@ -104,7 +102,7 @@ def require_no_other_file(path: Path, beginning: bytes, kind: str, offset: int =
         kind: the kind of file, for the message, such as "a GIF".
         offset: place of `beginning`, where other bytes are before it.
     """
-    try:
+    with report_os_error(f"cannot write {path}"):
         if not path.parent.is_dir():
             raise UserError(f"cannot write {path}: there is no folder {path.parent}")
         if path.is_file():
@@ -112,7 +110,5 @@ def require_no_other_file(path: Path, beginning: bytes, kind: str, offset: int =
                 is_other = file.read(offset + len(beginning))[offset:] != beginning
         else:  # writing to a folder fails later, with its own message
             is_other = path.exists() and not path.is_dir()
-    except OSError as error:
-        raise UserError(f"cannot write {path}: {error.strerror}") from error
     if is_other:
         raise UserError(f"{path} holds something else than {kind}: name another file")

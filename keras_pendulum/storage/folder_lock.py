@@ -10,7 +10,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, report_os_error
 
 LOCK_FILE = ".lock"
 # The errors of a file system without locks.
@@ -31,10 +31,8 @@ def lock_folder(folder: Path) -> Iterator[Callable[[], None]]:
     """
     file = folder / LOCK_FILE
     lock = FileLock(file, blocking=False, fallback_to_soft=False)
-    try:
+    with report_os_error(f"cannot read the folder {folder}"):
         folder.stat()  # FileLock would create a missing folder
-    except OSError as error:
-        raise UserError(f"cannot read the folder {folder}: {error.strerror}") from error
     try:
         lock.acquire()
     except Timeout as error:

@@ -19,7 +19,7 @@ from pathlib import Path
 from keras_pendulum.config.config import Config
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import TASKS
-from keras_pendulum.errors import UserError
+from keras_pendulum.errors import UserError, report_os_error
 from keras_pendulum.history import EpisodeRecord, csv_header
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.find_weights import checkpoints_in
@@ -53,12 +53,10 @@ class RunFolder:
         self.events = self._real_path / "tensorboard"
         self._evaluated = False  # whether history.csv has the column of the evaluations
         self.require_not_moved: Callable[[], None] = lambda: None  # see folder_lock.lock_folder
-        try:
+        with report_os_error(f"cannot read the folder {path}"):
             # Through a link, the run would replace or remove files of another folder.
             require_regular(*(self.path / file.name for file in (*self.files, *self._others)))
             require_folder(self.path / self.events.name)
-        except OSError as error:
-            raise UserError(f"cannot read the folder {path}: {error.strerror}") from error
 
     @property
     def files(self) -> list[Path]:
@@ -71,10 +69,8 @@ class RunFolder:
 
     def create(self) -> None:
         """Creates the folder if it does not exist. Raises UserError when that fails."""
-        try:
+        with report_os_error(f"cannot make the folder {self.path}"):
             self._real_path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UserError(f"cannot make the folder {self.path}: {error.strerror}") from error
 
     @contextlib.contextmanager
     def lock(self) -> Iterator[None]:
@@ -148,17 +144,15 @@ class RunFolder:
         Raises UserError when the row cannot be written.
         """
         self.require_not_moved()
-        try:
-            # Not mode "a": it would make a file without the rows before.
-            with retry_while_open(
-                lambda: open(self.history, "r+", encoding="ascii", newline="")
-            ) as file:
-                file.seek(0, os.SEEK_END)
-                file.write(record.csv_row(self._evaluated) + "\n")
-        except FileNotFoundError:
-            pass
-        except OSError as error:
-            raise UserError(f"cannot write {self.history}: {error.strerror}") from error
+        # Not mode "a": it would make a file without the rows before.
+        open_file = partial(open, self.history, "r+", encoding="ascii", newline="")
+        with (
+            report_os_error(f"cannot write {self.history}"),
+            contextlib.suppress(FileNotFoundError),
+            retry_while_open(open_file) as file,
+        ):
+            file.seek(0, os.SEEK_END)
+            file.write(record.csv_row(self._evaluated) + "\n")
 
     def restore_history(self, history: Iterable[EpisodeRecord]) -> None:
         """Writes history.csv again if it was removed during the run.
@@ -216,7 +210,5 @@ def _network_files(folder: Path, task: type[Task]) -> list[Path]:
 
 def _remove(*files: Path) -> None:
     for file in files:
-        try:
+        with report_os_error(f"cannot replace {file}"):
             retry_while_open(partial(file.unlink, missing_ok=True))
-        except OSError as error:
-            raise UserError(f"cannot replace {file}: {error.strerror}") from error

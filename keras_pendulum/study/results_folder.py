@@ -12,7 +12,7 @@ from typing import Any
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.settings import read_settings
-from keras_pendulum.errors import ConfigError, UserError
+from keras_pendulum.errors import ConfigError, UserError, report_os_error
 from keras_pendulum.storage.atomic_write import retry_while_open, write_atomically
 from keras_pendulum.storage.folder_lock import LOCK_FILE, lock_folder
 from keras_pendulum.storage.small_files import read_small_file, require_folder, require_regular
@@ -56,7 +56,7 @@ class ResultsFolder:
         Without its `study.json`, a folder is usable when all its results belong to this study. A
         link in place of one of its files or folders is refused.
         """
-        with _user_error(f"cannot read the folder {self.path}"):
+        with report_os_error(f"cannot read the folder {self.path}"):
             try:
                 names = {file.name for file in self._folder.iterdir()} - {LOCK_FILE}
             except FileNotFoundError:
@@ -80,7 +80,7 @@ class ResultsFolder:
 
         Raises UserError when the folder is not usable or is in use, or cannot be written.
         """
-        with _user_error(f"cannot make the folder {self.path}"):
+        with report_os_error(f"cannot make the folder {self.path}"):
             self._folder.mkdir(parents=True, exist_ok=True)
         with lock_folder(self._folder) as self._require_in_place:
             self.require_usable()
@@ -88,7 +88,7 @@ class ResultsFolder:
                 content = {"versions": self.versions, "arms": self._description()}
                 text = json.dumps(content, indent=2, ensure_ascii=False) + "\n"
                 write_atomically(self._manifest, text.encode())
-            with _user_error(f"cannot write in {self.path}"):
+            with report_os_error(f"cannot write in {self.path}"):
                 for arm in self._first_arms.values():
                     (self._results / arm.slug).mkdir(parents=True, exist_ok=True)
             yield
@@ -121,13 +121,13 @@ class ResultsFolder:
                 f"{reply.worker} sent a damaged result of {job}: run the command again to retry it"
             )
         self._require_in_place()
-        with _user_error(f"cannot write in {self.path}"):
+        with report_os_error(f"cannot write in {self.path}"):
             require_folder(self._results, self._file(job).parent)
             require_regular(self._file(job), self._log)
         write_atomically(self._file(job), reply.result)
         seconds = (f"{each:.3f}" for each in (reply.training, reply.evaluation, reply.total))
         with (
-            _user_error(f"cannot write {self._log}"),
+            report_os_error(f"cannot write {self._log}"),
             retry_while_open(lambda: open(self._log, "a", encoding="utf-8", newline="")) as file,
         ):
             log = csv.writer(file, lineterminator="\n")
@@ -139,7 +139,7 @@ class ResultsFolder:
     def write(self, name: str, content: bytes) -> None:
         """Writes a table or a figure. Raises UserError when that fails."""
         file = self._folder / name
-        with _user_error(f"cannot write {file}"):
+        with report_os_error(f"cannot write {file}"):
             require_regular(file)
         write_atomically(file, content)
 
@@ -161,7 +161,7 @@ class ResultsFolder:
         return self._results / job.slug / f"{job.slug}-seed{job.config.seed}.json"
 
     def _read(self, job: Job) -> RunResult | None:
-        with _user_error(f"cannot read {self._file(job)}"):
+        with report_os_error(f"cannot read {self._file(job)}"):
             try:
                 return decode(read_small_file(self._file(job)), job)
             except FileNotFoundError:
@@ -175,7 +175,7 @@ class ResultsFolder:
 
     def _require_same_study(self) -> None:
         try:
-            with _user_error(f"cannot read {self._manifest}"):
+            with report_os_error(f"cannot read {self._manifest}"):
                 manifest = json.loads(read_small_file(self._manifest))
         except (ValueError, RecursionError) as error:
             raise UserError(
@@ -210,12 +210,3 @@ class ResultsFolder:
                     "command that made the results, with its presets and arms, or name another "
                     "folder with --out"
                 )
-
-
-@contextmanager
-def _user_error(problem: str) -> Iterator[None]:
-    """Raises UserError with the problem and its reason for an OSError in the `with` block."""
-    try:
-        yield
-    except OSError as error:
-        raise UserError(f"{problem}: {error.strerror}") from error
