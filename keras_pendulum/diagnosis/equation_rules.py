@@ -19,6 +19,7 @@ from keras_pendulum.diagnosis.rollouts import FewSteps, few_steps
 
 RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _GROWN = 3.0  # spreads above the best possible value
+_FOLLOWED = 0.6  # error of values that grow also beyond ends
 _UNRELATED = 0.5  # error of the right equation
 _SAME = 0.12  # spread of values that are nearly the same, as a share of their mean
 _RIGHT_VALUES = 0.9  # correlation with the exact values
@@ -29,6 +30,8 @@ _BY_CHANCE_OF_TWO = 0.2  # the same of the two actions of CartPole
 _OTHER_SLOPE = 1.7  # times the slope that the equation says
 _CLEARLY_BEST = 0.9  # share of the error of other observations that one has at most
 _ALIKE = 0.15  # less correlation of the advantages: then another observation fits as well
+_FITS_BETTER = 0.8  # share of the error of the usual γ that another one has at most
+_AS_WELL = 1.5  # times the error of another equation with the usual γ, which declares more
 _DIVERGED = 20.0  # spreads above the best possible value: no fixed point is there
 HEALTHY = f"{RIGHT} to 1 to 7 %"
 
@@ -47,11 +50,23 @@ def wrong_equation(m: Measurement) -> Finding | None:
 
 
 def shown_discount(m: Measurement) -> float | None:
-    """Returns another γ than the declared one, if the values obey its equation best."""
+    """Returns another γ than the usual one, which was assumed, if the values show it.
+
+    They obey its equation best, or a larger γ fits better than the usual one. A smaller γ fits the
+    values of a short training, too.
+    """
     if not (m.policy.has_q_values and m.finite):
         return None
-    found = obeyed_equation(m)
-    return None if found is None else found.equation.discount
+    found, right = obeyed_equation(m), m.right_agreement
+    if found is not None and found.equation.discount is not None:
+        return found.equation.discount
+    largest = min(_FITS_BETTER * right.error, _AS_WELL * found.agreement.error if found else np.inf)
+    larger = [
+        (own.error, equation.discount)
+        for own, equation in m.agreements
+        if equation.discount is not None and equation.discount > m.discount and own.error < largest
+    ]
+    return min(larger)[1] if larger else None
 
 
 class Obeyed(NamedTuple):
@@ -159,7 +174,7 @@ def growth_beyond_ends(m: Measurement) -> Finding | None:
     right = m.right_agreement
     for own, equation in m.agreements:
         beyond = equation.name == "missing-end" and own.at_ends > 0.9
-        if beyond and own.error < 0.6 * right.error:
+        if beyond and own.error < min(_FOLLOWED, 0.6 * right.error):
             evidence = (
                 f"values of {m.backup.q.mean():.2g}, and {percent(own.at_ends)} of it in the last "
                 f"step of an episode; they satisfy {equation.formula} to {percent(own.error)} and "

@@ -14,6 +14,8 @@ from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
 FEW = 200  # transitions that show nothing for sure
 _MOST_TRANSITIONS = 20_000  # whose motion is checked
+_MOST_STEPS = 20  # of one transition
+_SAME_STATE = 2e-3  # m, rad or their speeds
 
 Rows = NDArray[np.intp]
 
@@ -83,6 +85,17 @@ class Motion(ABC):
         An index that was not stored keeps its declared effort. Returns None unless nearly each
         stored index belongs to one effort alone.
         """
+
+    def action_lasts(self) -> bool:
+        """Returns whether an action lasts for several steps, for as many in most transitions."""
+        observation, following = self.replay.observation[-1000:], self.replay.next_observation
+        states, efforts = self.dynamics.states_of(observation), self.stored[-1000:, None]
+        for step in range(_MOST_STEPS):
+            states = self.dynamics.outcomes(states, efforts).state[:, 0]
+            distance = np.abs(self.dynamics.observe(states) - following[-1000:]).max(axis=1)
+            if np.mean(distance < _SAME_STATE) > 0.5:
+                return step > 0
+        return False
 
     def lost_actions(self) -> list[int]:
         """Returns the actions that acted, but were always stored as one other action.

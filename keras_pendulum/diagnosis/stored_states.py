@@ -55,7 +55,12 @@ def repeated_state(r: RunRecord) -> Finding | None:
                 ("too-few-updates", "wrong-target"),
             ),
         )
-    repeated = np.mean(np.all(replay.observation[1:] == replay.observation[:-1], axis=1))
+    # A transition that is stored twice is no mistake.
+    twice, same = (
+        np.all(each[1:] == each[:-1], axis=1)
+        for each in (replay.next_observation, replay.observation)
+    )
+    repeated = np.mean(same & ~twice)
     if repeated > 0.5:
         return Finding(
             "misaligned-transitions",

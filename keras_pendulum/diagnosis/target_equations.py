@@ -18,6 +18,7 @@ def _next(values: Callable[[Array], Array]) -> Callable[[Backup], Array]:
 
 _TARGET = "Its fixed point has other values, so the greedy policy follows another task."
 _TAKE_MAXIMUM = "Take the maximum over the actions: axis 1 of [B, A], of the next state's values."
+_FIXED = 0.72  # values that have not converged fit a fixed action, too, but not so much better
 
 ZERO_OTHERS = Equation(
     "wrong-loss",
@@ -73,6 +74,7 @@ TARGETS = (
         _next(lambda q: q[:, :, 0]),
         f"The target takes the value of the first action, whatever the next state is. {_TARGET}",
         f"{_TAKE_MAXIMUM} An index [0] in place of max does this.",
+        share=_FIXED,
         next_action=lambda q, random: np.zeros(len(q), np.intp),
     ),
     Equation(
@@ -82,6 +84,7 @@ TARGETS = (
         _next(lambda q: q[:, :, -1]),
         f"The target takes the value of the last action, whatever the next state is. {_TARGET}",
         f"{_TAKE_MAXIMUM} An index [-1] in place of max does this.",
+        share=_FIXED,
         next_action=lambda q, random: np.full(len(q), q.shape[1] - 1),
     ),
     Equation(

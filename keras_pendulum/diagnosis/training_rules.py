@@ -12,6 +12,11 @@ from keras_pendulum.diagnosis.faults import Finding
 from keras_pendulum.diagnosis.hidden_units import stuck_units
 from keras_pendulum.diagnosis.measurement import Measurement
 
+# Outputs that were not learned are so far above the others, in spreads of their values and of the
+# exact ones. Initial values differ less.
+_AHEAD, _LEARNED = 0.25, 0.02
+_STORED = 0.25  # times the usual number; an output with so many transitions has been learned
+
 
 def untrained_outputs(m: Measurement) -> Finding | None:
     """Finds outputs that are stored as others, never stored, or far from all others."""
@@ -36,7 +41,11 @@ def untrained_outputs(m: Measurement) -> Finding | None:
                 repairs.mask_outputs(m, missing),
             )
     odd = np.flatnonzero(m.outliers > max(10.0, 0.3 * m.outliers.max())).tolist()
-    picked = bool(odd) and m.learned_q[:, odd].mean() > np.delete(m.learned_q, odd, axis=1).mean()
+    others = np.delete(m.learned_q, odd, axis=1)
+    ahead = max(_AHEAD * others.std(), _LEARNED * m.value_spread)
+    picked = bool(odd) and m.learned_q[:, odd].mean() > others.mean() + ahead
+    if m.record is not None and m.record.is_buffer and picked:
+        picked = bool(counts[odd].min() < _STORED * counts.mean())
     if picked and len(odd) <= len(m.outliers) / 4 and m.outliers.max() > 14:
         return Finding(
             "untrained-outputs",

@@ -21,7 +21,7 @@ from keras_pendulum.diagnosis.stored_states import (
     repeated_state,
 )
 
-_LEAST_BATCH, _BATCH = 32, 512  # another number of transitions is not a batch
+_LEAST_BATCH, _BATCH = 32, 256  # another number of transitions is not a batch
 _SMALL_BUFFER = 6000
 _OTHER_EFFORT = 0.05  # N·m or N
 _BEYOND = 1.1  # times the observation; what is then no end is not near one
@@ -38,7 +38,7 @@ def stored_transitions(m: Measurement) -> Finding | None:
     finding = constant_number(m, r) or _many_ends(m, r) or repeated_state(r)
     if finding is None and m.motion.obeying() < 0.98:
         one_step = rewards.fit.correlation > 0.999 and abs(rewards.fit.slope - 1) < 0.01
-        if has_several_steps(r) and not one_step:
+        if (has_several_steps(r) and not one_step) or m.motion.action_lasts():
             return None  # right, but not to be compared with one step of the dynamics
         finding = _other_actions(m, r) or _other_efforts(m, r) or _other_motion(m)
     return finding or _missing_ends(m, r) or _other_rewards(m, r, rewards)
@@ -167,7 +167,8 @@ def _other_rewards(m: Measurement, r: RunRecord, rewards: StoredRewards) -> Find
         evidence = "stored rewards are those of the step before"
         return Finding("misaligned-transitions", evidence, "those of their own step")
     if correlation < 0.995 and rewards.follow_states(m.dynamics.observation_sizes):
-        evidence = f"correlation of the recorded rewards with the exact ones {correlation:.2f}"
+        kind = "stored" if r.is_buffer else "recorded"
+        evidence = f"correlation of the {kind} rewards with the exact ones {correlation:.2f}"
         return Finding("other-reward", evidence, "1.00")
     return None
 

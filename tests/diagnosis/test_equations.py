@@ -172,6 +172,10 @@ def silu(values: Any) -> Any:
         ("output", relu, 41, {"gravity": 10.0, "discount": 0.99, "reward_scale": 0.1}),
         ("hundred_updates", np.tanh, 11, {"gravity": 10.0, "discount": 0.985}),
         ("few_updates", np.tanh, 11, {"gravity": 10.0, "discount": 0.985}),
+        ("near_outputs", relu, 5, {"gravity": 10.0, "discount": 0.97}),
+        ("no_target_network", relu, 5, {"gravity": 10.0, "discount": 0.97}),
+        # Its γ is 0.98. With 0.9, the values fit the lowest of the next values.
+        ("undeclared", relu, 5, {"gravity": 10.0}),
         ("pole", silu, None, {"environment": "CartPole-v1", "discount": 0.95}),
         ("second_pole", relu, None, {"environment": "CartPole-v1", "discount": 0.99}),
     ],

@@ -17,7 +17,7 @@ from gymnasium.wrappers import TransformAction, TransformReward
 from recorded_runs import buffer_of, record_run, swing_up
 
 import keras_pendulum as kp
-from keras_pendulum.diagnosis import run_rules, transition_rules
+from keras_pendulum.diagnosis import run_rules, training_rules, transition_rules
 from keras_pendulum.diagnosis.findings import RULES, find_in_record
 from keras_pendulum.diagnosis.record_sources import read_actions, transitions_of
 from keras_pendulum.diagnosis.run_record import make_record
@@ -229,8 +229,52 @@ def test_transitions_show_the_mistake(finding: str, change: Any, run: Any) -> No
     assert first(None, change(run)) == finding
 
 
-def test_ten_transitions_are_no_batch(run: Any) -> None:
-    assert not first(None, [each[-10:] for each in buffer_of(run)]).startswith("forgetting")
+@pytest.mark.parametrize("count", [10, 450])
+def test_few_transitions_and_a_young_buffer_are_no_batch(count: int, run: Any) -> None:
+    found = first(None, [each[-count:] for each in buffer_of(run)])
+    assert not found.startswith("forgetting")
+
+
+def test_transitions_that_are_stored_twice_are_no_old_state(run: Any) -> None:
+    assert first(None, [np.repeat(each, 2, axis=0) for each in buffer_of(run)]) == "nothing"
+
+
+def test_outputs_that_are_often_stored_are_not_called_untrained() -> None:
+    def raised(observations: Any) -> Any:
+        q = 0.14 * exact_values(observations) - 1
+        q[:, [2, 4]] = 0.3
+        return q
+
+    transitions = buffer_of(record_run(epsilon=lambda done: 1.0))
+    record = make_record(None, transitions, TORQUES, PENDULUM)
+    assert training_rules.untrained_outputs(measure(raised)) is not None
+    assert training_rules.untrained_outputs(measure(raised, record)) is None
+
+
+@pytest.mark.parametrize("steps", [2, 4])
+@pytest.mark.parametrize("environment", ["Pendulum-v1", "CartPole-v1"])
+def test_wrapper_that_repeats_each_action_is_no_fault(environment: str, steps: int) -> None:
+    env, random = gymnasium.make(environment), np.random.RandomState(0)
+    efforts = [[-2.0], [2.0]] if environment == "Pendulum-v1" else [0, 1]
+    transitions = []
+    observation, _ = env.reset(seed=0)
+    for _ in range(600):
+        index, rewards, over = random.randint(2), 0.0, False
+        for _ in range(steps):
+            following, reward, terminated, truncated, _ = env.step(efforts[index])
+            rewards, over = rewards + float(reward), terminated or truncated
+            if over:
+                break
+        transitions.append((observation, index, rewards, following, terminated))
+        observation = env.reset()[0] if over else following
+    noise = random.normal(size=(len(observation), 2))
+    torques = [-2.0, 2.0] if environment == "Pendulum-v1" else None
+    agent = kp.q_function(lambda x: np.sin(x @ noise), torques)
+    found = kp.diagnose(
+        agent, environment=environment, gravity=10 if torques else None, transitions=transitions
+    )
+    names = {each.name for each in found.findings}
+    assert not names & {"misaligned-transitions", "other-gravity", "torque-map"}
 
 
 def test_constant_that_is_added_to_the_stored_rewards_is_named(run: Any) -> None:

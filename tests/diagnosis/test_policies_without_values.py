@@ -50,6 +50,26 @@ def test_simple_repair_is_found(agent: Any, finding: str, repair: str) -> None:
 
 
 @pytest.mark.usefixtures("few_starts")
+def test_small_torques_that_are_a_choice_are_not_doubled() -> None:
+    def weak(observation: Any) -> float:
+        torque = greedy(observation)
+        return torque if abs(torque) > 1.9 and observation[0] < 0 else 0.4 * torque
+
+    assert diagnose(weak).findings == []
+
+
+def test_cart_that_drifts_is_not_a_cart_seen_reversed() -> None:
+    """Half-trained policies drift, and stay on the track once the position is reversed."""
+    weights = np.array([-1.0, 0.8, 8, 2])
+    found = kp.diagnose(lambda o: int(o @ weights > 0), environment="CartPole-v1", discount=0.99)
+    balances = kp.evaluate_policy(
+        lambda o: int(o @ (weights * [-1, 1, 1, 1]) > 0), environment="CartPole-v1"
+    )
+    assert found.measurement.regret > 100 and balances.regret == 0
+    assert not any("observation [-x" in each.evidence for each in found.findings)
+
+
+@pytest.mark.usefixtures("few_starts")
 def test_nothing_is_guessed_about_a_constant_torque() -> None:
     diagnosis = diagnose(lambda observation: 0.0)
     assert diagnosis.findings == []
