@@ -19,6 +19,7 @@ _WORST_REWARD = -Pendulum.reward_range[0]
 _LOWEST_MEAN_REWARD = -1.3 * np.pi**2
 _SAME_VALUES = 0.01  # spread of values that are the same in all states, as a share of their mean
 _BEYOND_REWARDS = 1000  # times the lowest possible value
+_BOTH_SIDES = 0.5  # times the mean below 0, of the highest value above 0
 _STILL_FALLING = 0.5  # distance to the targets, as a share of the mean reward
 _LOGARITHMS = "exp of the values of each state has the sum 1"
 _AT_THE_BOUND = 0.3  # share of the outputs; a linear head has none there
@@ -180,8 +181,9 @@ def reward_size(m: Measurement) -> Finding | None:
     lowest = -_WORST_REWARD / max(1 - m.discount, 0.005)
     mean = float(m.learned_q.mean())
     if mean < lowest:
-        # No rewards are so large, but values that grow without bound are.
-        name = "broken-network" if mean < _BEYOND_REWARDS * lowest else "reward-scale"
+        # No rewards are so large, but values that grow without bound are, also to both sides.
+        grows = mean < _BEYOND_REWARDS * lowest or m.learned_q.max() > -_BOTH_SIDES * mean
+        name = "broken-network" if grows else "reward-scale"
         return Finding(
             name, f"a mean value of {mean:.3g}", f"above {lowest:.0f}, the lowest possible"
         )

@@ -47,11 +47,16 @@ class PlayedSteps(NamedTuple):
         Raises ConfigError as `read_actions` does.
         """
         indices, effort = read_actions(steps.action, efforts, "record")
-        steps = undo_change(dynamics, steps, "record")
+        steps, levels = undo_change(dynamics, steps, "record"), efforts
         if effort is None:
             assert efforts is not None
             effort = efforts[indices]
-        return cls(steps, effort, _LEVELS if efforts is None else efforts, dynamics)
+        elif efforts is not None:
+            used = np.unique(effort)
+            matched = len(np.unique(nearest(used, efforts)))
+            if matched < 0.7 * len(used) <= 0.7 * len(efforts):  # not those of the outputs
+                levels = used
+        return cls(steps, effort, _LEVELS if levels is None else levels, dynamics)
 
     def random_shares(self) -> RandomShares | None:
         """Returns about the share of random actions in parts of the run; None if it is short.

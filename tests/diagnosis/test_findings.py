@@ -57,6 +57,7 @@ def test_exact_values_give_no_finding() -> None:
         ("broken-network", lambda o: np.full((len(o), 41), -3.0)),
         ("broken-network", lambda o: np.tile(-30 - np.arange(41) / 10, (len(o), 1))),  # all dead
         ("broken-network", lambda o: 1e12 * np.sin(50 * exact_values(o))),
+        ("broken-network", lambda o: 1e4 * (np.sin(50 * exact_values(o)) - 0.3)),  # to both sides
         ("overestimation", lambda o: 1e12 * (2 + np.sin(50 * exact_values(o)))),
         ("overestimation", lambda o: exact_values(o) + 60 * np.abs(np.sin(3 * o @ NOISE))),
     ],

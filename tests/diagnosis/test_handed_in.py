@@ -19,6 +19,7 @@ from recorded_runs import buffer_of, record_run, swing_up
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import run_rules, training_rules, transition_rules
 from keras_pendulum.diagnosis.findings import RULES, find_in_record
+from keras_pendulum.diagnosis.played_steps import PlayedSteps
 from keras_pendulum.diagnosis.record_sources import read_actions, transitions_of
 from keras_pendulum.diagnosis.run_record import make_record
 from keras_pendulum.diagnosis.stored_rewards import StoredRewards
@@ -414,6 +415,13 @@ def test_policy_without_values_is_judged_by_its_record(run: Any) -> None:
 )
 def test_usual_exploration_is_no_fault(episodes: int, epsilon: Callable[[float], float]) -> None:
     assert first(record_run(episodes=episodes, epsilon=epsilon)) == "nothing"
+
+
+def test_random_torques_may_be_smaller_than_those_of_the_outputs() -> None:
+    env = record_run(epsilon=lambda done: 1.0 if done < 0.5 else 0.1)
+    played = PlayedSteps.of(env.steps._replace(action=env.steps.action / 2), TORQUES, PENDULUM)
+    shares = played.random_shares()
+    assert shares is not None and min(shares.beginning, shares.tenths[:5].min()) > 0.5
 
 
 @pytest.mark.parametrize(("epsilon", "shown"), [(0.02, True), (0.12, False)])
