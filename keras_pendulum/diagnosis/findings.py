@@ -12,6 +12,7 @@ from dataclasses import replace
 from keras_pendulum.diagnosis import (
     acting_rules,
     equation_rules,
+    growth_rules,
     output_rules,
     policy_rules,
     run_rules,
@@ -22,8 +23,8 @@ from keras_pendulum.diagnosis.faults import FAULTS, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 
 RULES: tuple[Callable[[Measurement], Finding | None], ...] = (
-    equation_rules.growth_beyond_ends,
-    equation_rules.growth_everywhere,
+    growth_rules.growth_beyond_ends,
+    growth_rules.growth_everywhere,
     output_rules.not_finite,
     transition_rules.stored_transitions,
     output_rules.bounded_output,
