@@ -102,6 +102,11 @@ def diagnose(
     else:
         run = read_record(folder)
     sentences = [assumption] if assumption else []
+    if policy.has_q_values and _has_random_values(policy):
+        sentences.append(
+            "Asked twice, the agent gives two values for one observation: is dropout still on? "
+            "Hand in the network as it is after the training (model.eval() in PyTorch)"
+        )
     declared = policy.info.discount if discount is None else discount
     if declared is not None:
         declared = Number(0, 1).validate("discount", declared)
@@ -137,6 +142,11 @@ def _upright(task: Task) -> NDArray[np.float32]:
 
 def _are_finite(policy: Policy) -> bool:
     return bool(np.isfinite(policy.q_values(_upright(policy.task))).all())
+
+
+def _has_random_values(policy: Policy) -> bool:
+    first, second = (policy.q_values(_upright(policy.task)) for _ in range(2))
+    return not np.allclose(first, second, rtol=1e-3, equal_nan=True)
 
 
 def _start_count(policy: Policy) -> int:

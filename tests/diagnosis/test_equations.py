@@ -100,6 +100,19 @@ def test_discount_that_the_values_do_not_show_is_the_usual_one() -> None:
     assert "records no discount. 0.9 was assumed" in diagnosis.assumptions[-1]
 
 
+@pytest.mark.parametrize("is_training", [True, False])
+def test_dropout_that_is_still_on_is_said(is_training: bool) -> None:
+    """Its values differ at each call, and so do the findings."""
+    random, values = np.random.RandomState(0), fixed_point(right)
+
+    def q_values(observations: Any) -> Any:
+        noise = random.normal(size=(len(observations), LAST + 1))
+        return values(observations) * (1 + 0.1 * is_training * noise)
+
+    said = "".join(diagnose(q_values).assumptions)
+    assert ("gives two values for one observation: is dropout still on?" in said) == is_training
+
+
 @pytest.mark.parametrize(("size", "constant"), [(1 / 8.1, 1.0), (1.0, 8.0), (1 / 16.27, 1.0)])
 def test_constant_that_is_added_to_the_rewards_is_named(size: float, constant: float) -> None:
     values = fixed_point(lambda r, following, own: right(size * r + constant, following, own))
