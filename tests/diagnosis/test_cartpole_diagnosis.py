@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.diagnosis.cartpole_motion import CartPoleMotion
 from keras_pendulum.diagnosis.transition_rules import truncation_as_end
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.optimum.cartpole import CartPoleSolution
@@ -186,3 +187,14 @@ def test_shipped_agent_has_no_finding() -> None:
     assert diagnosis.findings == []
     assert diagnosis.as_json()["environment"] == "CartPole-v1"
     assert diagnosis.figure().axes
+
+
+@pytest.mark.parametrize(
+    ("slope", "accepted"),
+    [(0.02, True), (0.0388, True), (0.079, True), (0.0083, False), (0.05, False)],
+)
+def test_wrapper_that_repeats_each_action_is_no_normalisation(slope: float, accepted: bool) -> None:
+    """Of 2 and 4 steps, the speed changes a little on the way."""
+    before = np.random.RandomState(0).normal(size=(500, 4))
+    after = before + np.outer(before[:, 1], [slope, 0, 0, 0])
+    assert (CartPoleMotion.are_observations(before, after) == "") is accepted
