@@ -60,7 +60,9 @@ def shown_discount(m: Measurement) -> float | None:
     larger = [
         (own.error, equation.discount)
         for own, equation in m.agreements
-        if equation.discount is not None and equation.discount > m.discount and own.error < largest
+        if equation.discount is not None
+        and m.discount < equation.discount < 1
+        and own.error < largest
     ]
     return min(larger)[1] if larger else None
 

@@ -54,7 +54,8 @@ class PlayedSteps(NamedTuple):
         elif efforts is not None:
             used = np.unique(effort)
             matched = len(np.unique(nearest(used, efforts)))
-            if matched < 0.7 * len(used) <= 0.7 * len(efforts):  # not those of the outputs
+            smaller = matched < 0.7 * len(used) <= 0.7 * len(efforts)
+            if smaller and np.ptp(used) > 2 * _CLOSE:  # they are not those of the outputs
                 levels = used
         return cls(steps, effort, _LEVELS if levels is None else levels, dynamics)
 
@@ -75,9 +76,10 @@ class PlayedSteps(NamedTuple):
         return RandomShares(tenths, min(beginning), beginning[0])
 
     def _shares(self, rows: NDArray[np.intp], lasts: bool) -> tuple[float, float]:
-        """Returns two upper bounds; only the first one is valid if an action lasts for some steps.
+        """Returns two upper bounds; the second one holds only where no action lasts.
 
-        `lasts` says whether each action of the run does.
+        Both are the first one where actions last: each of the run, which `lasts` says, or random
+        ones, which the efforts show.
         """
         effort, levels = self.effort[rows], self.levels
         chance = float(np.mean(np.abs(levels[:, None] - levels) <= _CLOSE))

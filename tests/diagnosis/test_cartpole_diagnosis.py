@@ -198,3 +198,13 @@ def test_wrapper_that_repeats_each_action_is_no_normalisation(slope: float, acce
     before = np.random.RandomState(0).normal(size=(500, 4))
     after = before + np.outer(before[:, 1], [slope, 0, 0, 0])
     assert (CartPoleMotion.are_observations(before, after) == "") is accepted
+
+
+@pytest.mark.parametrize(("noise", "named"), [(3.0, True), (15.0, False)])
+def test_grown_values_that_satisfy_no_equation_are_no_missing_end(
+    noise: float, named: bool
+) -> None:
+    """They satisfy the one without ends to 34 % or to 102 %."""
+    function = kp.q_function(lambda o: 600 + noise * np.sin(3 * o @ WEIGHTS))
+    found = kp.diagnose(function, environment="CartPole-v1", discount=0.99).findings
+    assert (found[0].name == "missing-end") is named
