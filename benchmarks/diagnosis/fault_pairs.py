@@ -13,9 +13,9 @@ from __future__ import annotations
 import sys
 
 from benchmarks.diagnosis.labelled_networks import PAIRS, pair_cases
-from benchmarks.diagnosis.resumable import Result
 from benchmarks.diagnosis.single_faults import diagnose_cases, found, is_costly, share
 from benchmarks.result_files import Row, write
+from benchmarks.resumable import Result
 
 
 def summarize(results: list[Result]) -> list[Row]:

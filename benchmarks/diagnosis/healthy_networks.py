@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from benchmarks.diagnosis.faults import ACTIVATIONS, SIZES
 from benchmarks.diagnosis.labelled_networks import Case, train_config
-from benchmarks.diagnosis.resumable import Result, measure_each
 from benchmarks.diagnosis.single_faults import counts
 from benchmarks.learning.other_libraries import train_sb3
 from benchmarks.result_files import ROOT, Row, write
+from benchmarks.resumable import Result, measure_each
 from keras_pendulum.config.config import Config
 from keras_pendulum.config.presets import preset
 

@@ -28,8 +28,8 @@ from benchmarks.diagnosis.labelled_networks import (
     single_cases,
     train_case,
 )
-from benchmarks.diagnosis.resumable import Result, measure_each
 from benchmarks.result_files import RESULTS, Row, write
+from benchmarks.resumable import Result, measure_each
 from keras_pendulum.diagnosis.faults import FAULTS as TEXTS
 
 HEALTHY = "healthy"

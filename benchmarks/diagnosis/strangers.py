@@ -23,10 +23,10 @@ import numpy as np
 
 from benchmarks.diagnosis import stranger_programs
 from benchmarks.diagnosis.cartpole_programs import CARTPOLE_MISTAKES, CARTPOLE_RIGHT
-from benchmarks.diagnosis.resumable import Result, measure_each
 from benchmarks.diagnosis.single_faults import counts, share
 from benchmarks.diagnosis.stranger_programs import Trained, make_program, train
 from benchmarks.result_files import Row, write
+from benchmarks.resumable import Result, measure_each
 
 RIGHT = stranger_programs.RIGHT | CARTPOLE_RIGHT
 MISTAKES = stranger_programs.MISTAKES | CARTPOLE_MISTAKES

@@ -1,13 +1,14 @@
 """The value of each setting in which a preset departs from an earlier one.
 
-    python -m benchmarks.learning.departures swingup|cartpole [SEEDS [ROW …]]
+    python -m benchmarks.learning.departures FOLDER swingup|cartpole [SEEDS]
 
 `swingup` departs from `reference`, and `cartpole` from `cartpole-original`. Trains both presets,
 and the later one without each of its departures, with the training seeds 0, 1, … (10 seeds), two
 runs at a time. Writes the greedy regrets on the starts of seeds 0 to 99, of CartPole on those of 0
-to 999, with their interquartile mean. With ROWs, such as `discount`, it trains only these and keeps
-the other rows of the last results. On two cores, `cartpole` takes 20 minutes and `swingup` an hour
-and a half. `reference` departs from `original`: its rows are arms of the study, so
+to 999, with their interquartile mean. The command may be stopped and started again: the regrets in
+FOLDER/regrets.jsonl are used again. After a change of a preset, it trains only the rows whose
+settings are others. On two cores, `cartpole` takes 20 minutes and `swingup` an hour and a half.
+`reference` departs from `original`: its rows are arms of the study, so
 `benchmarks.learning.study` trains them.
 """
 
@@ -19,7 +20,7 @@ from dataclasses import fields, replace
 
 import keras_pendulum as kp
 from benchmarks.learning.study import table
-from benchmarks.learning.variants import table_row, train_variants
+from benchmarks.learning.variants import train_variants
 from benchmarks.result_files import rows_of, write
 
 BEFORE = {"reference": "original", "swingup": "reference", "cartpole": "cartpole-original"}
@@ -56,8 +57,8 @@ def _measured_by_the_study() -> dict[str, list[float]]:
     return {name: regrets[name] for name in ("reference", "original")} | without
 
 
-def main(preset: str, seeds: str = "10", *only: str) -> None:
-    """Trains every variant, or those of the rows in `only`, and writes the results."""
+def main(folder: str, preset: str, seeds: str = "10") -> None:
+    """Trains every variant that the folder does not have; writes the results."""
     if preset not in MEASURED_HERE:
         raise SystemExit(f"error: {preset}: expected one of {', '.join(MEASURED_HERE)}")
     after, before = kp.preset(preset), kp.preset(BEFORE[preset])
@@ -65,14 +66,10 @@ def main(preset: str, seeds: str = "10", *only: str) -> None:
     for name in departures(preset):
         unchanged = (name, *_DEPENDENT.get((preset, name), ()))
         variants[name] = after.change(**{each: getattr(before, each) for each in unchanged})
-    chosen = {name: config for name, config in variants.items() if not only or name in only}
     starts = range(100 if after.task.never_terminates else 1000)
-    trained = {row["training"]: row for row in train_variants(chosen, range(int(seeds)), starts)}
-    earlier = measured(preset) if only else {}
-    rows = [trained.get(name) or table_row(name, earlier[name]) for name in variants]
-    write(
-        f"departures_{preset}", f"python -m benchmarks.learning.departures {preset} {seeds}", rows
-    )
+    rows = train_variants(variants, range(int(seeds)), starts, folder)
+    command = f"python -m benchmarks.learning.departures FOLDER {preset} {seeds}"
+    write(f"departures_{preset}", command, rows)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 """The settings of `reference` beside others, on seeds that no result is reported for.
 
-    python -m benchmarks.learning.rejected_settings [SEEDS ["NAME: PRESET field=value …" …]]
+    python -m benchmarks.learning.rejected_settings FOLDER [SEEDS ["NAME: PRESET field=value …" …]]
 
 Trains arms with the training seeds 100, 101, … (8 seeds), two runs at a time, and evaluates each
 run greedily on the starts of seeds 1000 to 1299. Arms are written as for the study; the default
-ones are those of docs/presets.md. It takes seven minutes on two cores.
+ones are those of docs/presets.md. The regrets in FOLDER/regrets.jsonl are used again. The command
+takes seven minutes on two cores.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ ARMS = (
 )
 
 
-def main(seeds: str = "8", *texts: str) -> None:
+def main(folder: str, seeds: str = "8", *texts: str) -> None:
     """Trains every arm; writes the results of the default ones."""
     variants = {arm.name: arm.config for arm in own_arms([], texts or ARMS)}
-    rows = train_variants(variants, range(100, 100 + int(seeds)), range(1000, 1300))
+    rows = train_variants(variants, range(100, 100 + int(seeds)), range(1000, 1300), folder)
     if not texts:
-        write("choosing", f"python -m benchmarks.learning.rejected_settings {seeds}", rows)
+        write("choosing", f"python -m benchmarks.learning.rejected_settings FOLDER {seeds}", rows)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 from dataclasses import replace
 from functools import partial
@@ -10,6 +11,7 @@ from multiprocessing.pool import Pool
 import keras_pendulum as kp
 from benchmarks.learning.regrets import mean_and_interval
 from benchmarks.result_files import Row
+from benchmarks.resumable import Result, measure_each
 
 
 def two_processes() -> Pool:
@@ -36,13 +38,22 @@ def table_row(name: str, regrets: list[float]) -> Row:
     }
 
 
-def train_variants(variants: dict[str, kp.Config], seeds: range, starts: range) -> list[Row]:
-    """Trains each variant with each of the seeds, two runs at a time; returns a row for each."""
-    rows: list[Row] = []
+def train_variants(
+    variants: dict[str, kp.Config], seeds: range, starts: range, folder: str
+) -> list[Row]:
+    """Trains each variant with each of the seeds, two runs at a time; returns a row for each.
+
+    The regrets in FOLDER/regrets.jsonl, of the same settings, seeds and starts, are used again.
+    """
     with two_processes() as pool:
+        items = []
         for name, config in variants.items():
+            key = json.dumps([config.learning(), list(seeds), starts[0], len(starts)])
             configs = [replace(config, seed=seed) for seed in seeds]
-            regrets = pool.map(partial(regret, starts=starts), configs, 1)
-            rows.append(table_row(name, regrets))
-            print(f"{name:25} {regrets}", flush=True)
-    return rows
+            items.append((key, partial(_variant_regrets, name, configs, starts, pool)))
+        results = measure_each(items, folder, "regrets")
+    return [table_row(name, each["regrets"]) for name, each in zip(variants, results, strict=True)]
+
+
+def _variant_regrets(name: str, configs: list[kp.Config], starts: range, pool: Pool) -> Result:
+    return {"training": name, "regrets": pool.map(partial(regret, starts=starts), configs, 1)}

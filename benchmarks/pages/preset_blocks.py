@@ -141,7 +141,7 @@ def departure_table(preset: str) -> str:
     regrets = measured(preset)
     command = "learning.study FOLDER"
     if preset in MEASURED_HERE:
-        command = f"learning.departures {preset}"
+        command = f"learning.departures FOLDER {preset}"
     # Most runs of CartPole lose nothing, with and without a departure; a few lose much.
     shown = with_bad_runs if preset == "cartpole" else summary
     rows = []

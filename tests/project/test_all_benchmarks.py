@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from benchmarks import all as all_benchmarks
 from benchmarks.all import main, missing_packages
 from benchmarks.commands import COMMANDS, FOLDER, PYTHON, Command
 from benchmarks.learning.study import publish
+from benchmarks.resumable import measure_each
 
 NAMES = [command.name for command in COMMANDS]
 
@@ -116,7 +118,7 @@ def test_only_runs_named_commands_even_if_they_have_finished(tmp_path: Path) -> 
         names = ["tables", "learning.departures cartpole"]
         assert main(["--only", *names], work=tmp_path, run=runs) == 0
         assert runs.names == ["learning.departures", "tables"]
-        assert runs.lines[0][3:] == ["cartpole"]
+        assert runs.lines[0][3:] == [str(tmp_path / "learning"), "cartpole"]
 
 
 def test_unknown_name_is_refused(tmp_path: Path) -> None:
@@ -169,3 +171,21 @@ def test_published_study_names_its_machine(tmp_path: Path) -> None:
     assert table["rows"] == rows
     assert " cores of " in table["machine"]
     assert (docs / "figure.png").read_bytes() == b"figure.png"
+
+
+def test_finished_results_are_used_again(tmp_path: Path) -> None:
+    measured = []
+
+    def measure(number: int) -> dict[str, Any]:
+        measured.append(number)
+        if number == 3:
+            raise KeyboardInterrupt
+        return {"square": number**2}
+
+    items = [(str(number), partial(measure, number)) for number in (1, 2, 3)]
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            measure_each(items, str(tmp_path / "new"), "squares")
+    assert measured == [1, 2, 3, 3]
+    results = measure_each(items[:2], str(tmp_path / "new"), "squares")
+    assert results == [{"square": 1}, {"square": 4}]

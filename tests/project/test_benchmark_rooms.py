@@ -34,6 +34,7 @@ ORDER = (
     "files",
     "recorded_runs",
     "commands",
+    "resumable",
     "result_files",
 )
 # `all` runs the others, and another benchmark starts the other libraries.

@@ -30,6 +30,6 @@ def measure_each(
             known[key] = json.loads(json.dumps(measure()))
             with file.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps([key, known[key]]) + "\n")
-            print(key, known[key]["findings"], flush=True)
+            print(known[key], flush=True)
         results.append(known[key])
     return results
