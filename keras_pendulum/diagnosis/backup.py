@@ -13,7 +13,7 @@ from keras_pendulum.diagnosis.signals import Array, Fit, advantages, line_fit
 from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.environments.pendulum import MAX_SPEED
 from keras_pendulum.environments.task import Task
-from keras_pendulum.optimum.known_dynamics import KnownDynamics
+from keras_pendulum.optimum.known_dynamics import KnownDynamics, Outcomes
 
 
 class Backup(NamedTuple):
@@ -131,6 +131,7 @@ class Visited:
         task: Task | None = None,
         efforts: Array | None = None,
         observation: str | None = None,
+        steps: int = 1,
     ) -> Backup:
         """Returns the values at the states and at all that can follow.
 
@@ -138,14 +139,20 @@ class Visited:
             task: in place of the declared one.
             efforts: of the outputs [A], in place of the declared ones.
             observation: one of `observation_changes`, made before the network sees the observation.
+            steps: for which each action lasts; then the reward is the sum of theirs.
         """
         dynamics, states = self.dynamics, self.states
         if task is not None:
             dynamics = type(dynamics)(task)
         change = np.eye(len(dynamics.observation_sizes), dtype=np.float32)
-        if observation is not None:  # there are many, so a quarter of the states is enough
-            change, states = observation_changes(dynamics)[observation], self.states[::4]
-        outcomes = dynamics.outcomes(states, self.efforts if efforts is None else efforts)
+        if observation is not None:
+            change = observation_changes(dynamics)[observation]
+        if observation is not None or steps > 1:  # many are tried: a quarter is enough
+            states = states[::4]
+        efforts = self.efforts if efforts is None else efforts
+        outcomes = dynamics.outcomes(states, efforts)
+        for _ in range(steps - 1):
+            outcomes = _with_another_step(dynamics, outcomes, efforts)
         following = outcomes.state.reshape(-1, states.shape[1])
         next_observation: NDArray[np.float32] = dynamics.observe(following) @ change
         next_q = self.q_values(next_observation).reshape(*outcomes.reward.shape, -1)
@@ -154,6 +161,18 @@ class Visited:
         if ended.any():  # many programs give the last step a penalty, which is no mistake
             reward = np.where(ended, min(float(reward.mean()), float(q[ended].mean())), reward)
         return Backup(q, reward, next_q, self.discount, next_observation, ~ended, self.reward_scale)
+
+
+def _with_another_step(dynamics: KnownDynamics, outcomes: Outcomes, efforts: Array) -> Outcomes:
+    """Returns the outcomes after one more step with the same efforts [A]."""
+    reward, state, ended = outcomes
+    count = len(state)
+    again = dynamics.outcomes(state.reshape(reward.size, -1), np.tile(efforts, count)[:, None])
+    return Outcomes(
+        reward + np.where(ended, 0, again.reward.reshape(reward.shape)),
+        np.where(ended[..., None], state, again.state.reshape(state.shape)),
+        ended | again.terminated.reshape(ended.shape),
+    )
 
 
 class Agreement(NamedTuple):

@@ -86,6 +86,11 @@ class Equation:
         return True
 
 
+def percent(error: float) -> str:
+    """Returns an error as a text."""
+    return f"{error:.0%}".replace("%", " %") if error < 10 else "more than 1000 %"
+
+
 _SATISFIED = 0.04  # an error that leaves no doubt
 _REVERSED = -0.3  # correlation of the advantages with the right ones: that of reversed torques
 

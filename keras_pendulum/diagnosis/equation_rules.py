@@ -12,8 +12,9 @@ import numpy as np
 
 from keras_pendulum.diagnosis import comparisons, repairs
 from keras_pendulum.diagnosis.backup import Agreement
-from keras_pendulum.diagnosis.equation import RIGHT, Equation
+from keras_pendulum.diagnosis.equation import RIGHT, Equation, percent
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
+from keras_pendulum.diagnosis.lasting_rules import may_last
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.rollouts import FewSteps, few_steps
 
@@ -148,7 +149,7 @@ def obeyed_equation(m: Measurement) -> Obeyed | None:
     for own, equation in agreements:
         if is_refuted(own, equation) or not equation.explains(own, right, ends):
             continue
-        if is_short_training(equation):
+        if is_short_training(equation) or (not equation.offset and may_last(m, own.error)):
             continue
         repair = _repair(m, equation)
         # A network that sees CartPole wrongly may have learned too little to balance with a repair.
@@ -177,11 +178,6 @@ def not_converged(m: Measurement) -> Finding | None:
             evidence += f"; the values are the rewards of {few.steps} steps to "
             evidence += f"{percent(few.error)}, so few copies of the target network were made"
     return Finding("not-converged", evidence, f"{HEALTHY}; above 0.7")
-
-
-def percent(error: float) -> str:
-    """Returns an error as a text."""
-    return f"{error:.0%}".replace("%", " %") if error < 10 else "more than 1000 %"
 
 
 def _repair(m: Measurement, equation: Equation) -> Repair | None:

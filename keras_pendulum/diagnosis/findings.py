@@ -13,6 +13,7 @@ from keras_pendulum.diagnosis import (
     acting_rules,
     equation_rules,
     growth_rules,
+    lasting_rules,
     output_rules,
     policy_rules,
     run_rules,
@@ -79,7 +80,8 @@ def find(measurement: Measurement) -> list[Finding]:
                 if other not in fault.explains or other == proof
             }
     if not found:
-        finding = run_rules.unsteady_return(measurement)
+        finding = lasting_rules.lasting_actions(measurement)
+        finding = finding or run_rules.unsteady_return(measurement)
         if finding := finding or equation_rules.not_converged(measurement):
             found[finding.name] = finding
     return list(found.values())

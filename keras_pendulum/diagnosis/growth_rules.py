@@ -5,8 +5,8 @@ Each returns a finding, or None. `findings` says where the limits come from.
 
 from __future__ import annotations
 
-from keras_pendulum.diagnosis.equation import RIGHT
-from keras_pendulum.diagnosis.equation_rules import HEALTHY, percent
+from keras_pendulum.diagnosis.equation import RIGHT, percent
+from keras_pendulum.diagnosis.equation_rules import HEALTHY
 from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 

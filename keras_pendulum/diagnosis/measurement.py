@@ -6,6 +6,7 @@ import copy
 import pickle
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,13 @@ from keras_pendulum.diagnosis.played_agent import PlayedAgent, no_report
 from keras_pendulum.diagnosis.signals import Array, Fit
 from keras_pendulum.diagnosis.states import visited_states
 from keras_pendulum.evaluate.policy import Observations
+
+
+class LastingAction(NamedTuple):
+    """An action that lasts for some steps, as in a program with a frame skip."""
+
+    steps: int
+    agreement: Agreement  # of the values with the right equation of such actions
 
 
 @dataclass(frozen=True)
@@ -71,6 +79,15 @@ class Measurement(PlayedAgent):
     def agreements(self) -> list[tuple[Agreement, Equation]]:
         """The wrong equations, that with the smallest error first."""
         return sorted(agreements(self.visited, self.backup), key=lambda item: item[0].error)
+
+    @cached_property
+    def lasting_action(self) -> LastingAction:
+        """The number of steps, from 2 to 8, that an action lasts by the values."""
+        found = []
+        for steps in range(2, 9):
+            values = self.visited.backup(steps=steps)
+            found.append(LastingAction(steps, agreement(values, values.right)))
+        return min(found, key=lambda each: each.agreement.error)
 
     @cached_property
     def equation_errors(self) -> dict[str, float]:

@@ -20,6 +20,7 @@ _CLOSE = 0.5  # N·m or N, between efforts that count as the same
 _SAME_TIME = 25  # steps, in which similar states follow each other
 _AS_RANDOM = 0.77  # above: efforts in similar states differ nearly as random ones do
 _HELD = 0.1  # below: hardly any effort differs from those before and after it
+_DURATIONS = 50  # of an action; fewer are multiples of a number by chance
 _DEALT = 20  # successive steps of a half
 _LEVELS = np.linspace(-2, 2, 9)  # N·m, for an agent without outputs
 
@@ -70,16 +71,14 @@ class PlayedSteps(NamedTuple):
         if len(order) < 100 * PARTS:
             return None
         parts = [np.sort(rows[-_ROWS:]) for rows in np.array_split(order, PARTS)]
-        lasts = not any(self._lone_share(rows) for rows in parts)
-        tenths = np.array([min(self._shares(rows, lasts)) for rows in parts])
-        beginning = self._shares(np.sort(order[:BEGINNING]), lasts)
+        tenths = np.array([min(self._shares(rows)) for rows in parts])
+        beginning = self._shares(np.sort(order[:BEGINNING]))
         return RandomShares(tenths, min(beginning), beginning[0])
 
-    def _shares(self, rows: NDArray[np.intp], lasts: bool) -> tuple[float, float]:
-        """Returns two upper bounds; the second one holds only where no action lasts.
+    def _shares(self, rows: NDArray[np.intp]) -> tuple[float, float]:
+        """Returns two upper bounds; the second one holds only where no random action lasts.
 
-        Both are the first one where actions last: each of the run, which `lasts` says, or random
-        ones, which the efforts show.
+        Where the efforts show that random actions last, both are the first one.
         """
         effort, levels = self.effort[rows], self.levels
         chance = float(np.mean(np.abs(levels[:, None] - levels) <= _CLOSE))
@@ -95,7 +94,7 @@ class PlayedSteps(NamedTuple):
 
         in_states = share(np.abs(effort[compared] - effort[closest]))
         bound, lone = min(in_states, self._rare_share(rows)), self._lone_share(rows)
-        if lasts or (in_states > _AS_RANDOM and lone < _HELD):
+        if in_states > _AS_RANDOM and lone < _HELD:
             return bound, bound
         return bound, min(lone, share(np.abs(np.diff(effort)[follows])))
 
@@ -130,6 +129,17 @@ class PlayedSteps(NamedTuple):
         both = halves[0][rare[1]].mean() + halves[1][rare[0]].mean()
         return float(both * count / len(rows))
 
+    def action_steps(self) -> int:
+        """Returns for how many steps the program repeats each action; 1 where it does not."""
+        changes = np.flatnonzero(np.diff(self.effort, prepend=self.effort[:1]))
+        episode = np.cumsum(self._begins())[changes]
+        durations = np.diff(changes)[np.diff(episode) == 0]
+        return int(np.gcd.reduce(durations)) if len(durations) >= _DURATIONS else 1
+
+    def _begins(self) -> NDArray[np.bool_]:
+        """Returns whether an episode, or the kept part of it, begins with a row, [N]."""
+        return np.asarray(self.steps.first | (np.diff(self.steps.time, prepend=-1) < 1))
+
     def episodes(self) -> list[slice]:
         """Returns the rows of each recorded episode, in order of time.
 
@@ -137,7 +147,7 @@ class PlayedSteps(NamedTuple):
         are not complete.
         """
         steps = self.steps
-        starts = np.flatnonzero(steps.first | (np.diff(steps.time, prepend=-1) < 1))
+        starts = np.flatnonzero(self._begins())
         ends = np.append(starts[1:], len(steps.first))
         found = [
             slice(int(start), int(end))

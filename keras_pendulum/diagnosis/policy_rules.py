@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from keras_pendulum.diagnosis.equation import RIGHT, Equation, NextAction
-from keras_pendulum.diagnosis.equation_rules import HEALTHY, RIGHT_ERROR, obeyed_equation, percent
+from keras_pendulum.diagnosis.equation import RIGHT, Equation, NextAction, percent
+from keras_pendulum.diagnosis.equation_rules import HEALTHY, RIGHT_ERROR, obeyed_equation
 from keras_pendulum.diagnosis.faults import Fault, Finding
+from keras_pendulum.diagnosis.lasting_rules import may_last
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.rollouts import roll_out
 from keras_pendulum.diagnosis.target_equations import TARGETS
@@ -78,7 +79,7 @@ def followed_policy(m: Measurement) -> Finding | None:
     # Over ten steps, the mean of random actions smooths the network's own errors, too.
     if equation.variant == "mean-next" and one_step > _NEARLY * best_of_one_step:
         return None
-    if own > min(_LARGEST_ERROR, share * right.error):
+    if own > min(_LARGEST_ERROR, share * right.error) or may_last(m, one_step):
         return None
     evidence = (
         f"over {_STEPS} steps, the values satisfy {near[0].formula} to {percent(own)} and "

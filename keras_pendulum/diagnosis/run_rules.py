@@ -60,7 +60,9 @@ def exploration(m: Measurement) -> Finding | None:
         if first < 0.1:
             return Finding("exploration", f"ε of the first fifth {first:.2f}", "above 0.3")
         return None
-    if r.played is None or r.steps is None or (shares := r.played.random_shares()) is None:
+    if r.played is None or r.steps is None or r.played.action_steps() > 1:
+        return None  # steps with the same action do not show which ones were random
+    if (shares := r.played.random_shares()) is None:
         return None
     tenths, is_long = shares.tenths, r.steps >= _LONG_RUN
     last = float(tenths[-2:].mean())

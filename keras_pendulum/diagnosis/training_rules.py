@@ -10,6 +10,7 @@ import numpy as np
 from keras_pendulum.diagnosis import comparisons, repairs
 from keras_pendulum.diagnosis.faults import Finding
 from keras_pendulum.diagnosis.hidden_units import stuck_units
+from keras_pendulum.diagnosis.lasting_rules import clearly_last
 from keras_pendulum.diagnosis.measurement import Measurement
 
 # Outputs that were not learned are so far above the others, in spreads of their values and of the
@@ -104,7 +105,8 @@ def saturated_layer(m: Measurement) -> Finding | None:
 def overestimation(m: Measurement) -> Finding | None:
     """Finds values above the best possible ones, and above what the policy collects."""
     excess = m.excess
-    if excess > 3:  # also where nothing else about the values is right
+    # Also where nothing else about the values is right. A step that lasts has more reward.
+    if excess > 3 and not clearly_last(m):
         evidence = f"the highest value is above the best possible by {excess:.1f} spreads"
         return Finding("overestimation", evidence, "0.00 to 0.15")
     # A policy collects less than its values promise for many reasons. This setting is one of them.

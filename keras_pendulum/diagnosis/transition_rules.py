@@ -21,7 +21,7 @@ from keras_pendulum.diagnosis.stored_states import (
     repeated_state,
 )
 
-_LEAST_BATCH, _BATCH = 32, 256  # another number of transitions is not a batch
+_BATCH_SIZES = (32, 50, 64, 100, 128, 200, 256)  # so many transitions may be a batch
 _SMALL_BUFFER = 6000
 _OTHER_EFFORT = 0.05  # N·m or N
 _BEYOND = 1.1  # times the observation; what is then no end is not near one
@@ -181,7 +181,7 @@ def forgetting(m: Measurement) -> Finding | None:
     # An episode of CartPole is short until the pole is balanced.
     small = _SMALL_BUFFER if m.task.never_terminates else 1000
     stored = len(r.replay.action)
-    if _LEAST_BATCH <= stored <= _BATCH and r.steps is None and r.follows.mean() > 0.9:
+    if stored in _BATCH_SIZES and r.steps is None and r.follows.mean() > 0.9:
         return Finding(
             "forgetting",
             f"{r.follows.mean():.0%} of the {stored} transitions follow each other",

@@ -37,14 +37,14 @@ def _at(table: Array, corners: tuple[Array, Array]) -> Array:
 
 @cache
 def fixed_point(
-    target: Callable[[Array, Array, Array], Array], sweeps: int = 120, learned: Any = lambda s: s
+    target: Callable[[Array, Array, Array], Array], sweeps: int = 120, steps: int = 1
 ) -> Callable[[Array], Array]:
     """Returns a function from observations [B, 3] to Q-values [B, A].
 
     Args:
         target: returns the targets [N, A] of rewards [N, A], next values [N, A, A] and own values.
         sweeps: number of times that the targets replace the values.
-        learned: changes the rewards or torques; see the tests.
+        steps: of the environment for which each torque acts.
     """
     theta, speed = np.meshgrid(
         2 * np.pi * np.arange(_ANGLES) / _ANGLES, np.linspace(-8, 8, _SPEEDS), indexing="ij"
@@ -52,6 +52,12 @@ def fixed_point(
     reward, next_theta, next_speed = step_all_torques(
         GRAVITY, theta.ravel(), speed.ravel(), TORQUES
     )
+    torques = np.tile(TORQUES, len(reward))[:, None]
+    for _ in range(steps - 1):
+        more, next_theta, next_speed = step_all_torques(
+            GRAVITY, next_theta.ravel(), next_speed.ravel(), torques
+        )
+        reward = reward + more.reshape(reward.shape)
     corners = _corners(next_theta.ravel(), next_speed.ravel())
     q = np.zeros_like(reward)
     for _ in range(sweeps):

@@ -17,6 +17,7 @@ from keras_pendulum.diagnosis import equation_rules, policy_rules
 from keras_pendulum.diagnosis.backup import Agreement, Backup
 from keras_pendulum.diagnosis.constant_futures import constant_futures
 from keras_pendulum.diagnosis.equation import Equation
+from keras_pendulum.diagnosis.findings import find
 from keras_pendulum.diagnosis.policy_rules import followed_policy
 from keras_pendulum.diagnosis.target_equations import TARGETS as WRONG_TARGETS
 from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
@@ -81,6 +82,15 @@ def test_solution_of_the_right_equation_has_no_finding() -> None:
     diagnosis = diagnose(fixed_point(right))
     assert diagnosis.findings == []
     assert diagnosis.measurement.right_agreement.error < 0.03
+
+
+@pytest.mark.parametrize("steps", [3, 4, 8])
+def test_values_of_actions_that_last_have_no_fault(steps: int) -> None:
+    """A program with a frame skip is right, but the agent here acts anew at each step."""
+    found = find(diagnose(fixed_point(right, steps=steps)).measurement)
+    assert [each.title for each in found] == ["not-converged (lasting-actions)"]
+    assert f", and with actions that last for {steps} steps to " in found[0].evidence
+    assert found[0].remedy.startswith("That is not a fault.")
 
 
 @pytest.mark.parametrize(("discount", "assumed"), [(0.5, 0.5), (0.89, 0.9), (0.95, 0.95)])

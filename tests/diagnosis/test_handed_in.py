@@ -18,7 +18,7 @@ from recorded_runs import buffer_of, record_run, swing_up
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import run_rules, training_rules, transition_rules
-from keras_pendulum.diagnosis.findings import RULES, find_in_record
+from keras_pendulum.diagnosis.findings import RULES, find, find_in_record
 from keras_pendulum.diagnosis.played_steps import PlayedSteps
 from keras_pendulum.diagnosis.record_sources import read_actions, transitions_of
 from keras_pendulum.diagnosis.run_record import make_record
@@ -230,7 +230,7 @@ def test_transitions_show_the_mistake(finding: str, change: Any, run: Any) -> No
     assert first(None, change(run)) == finding
 
 
-@pytest.mark.parametrize("count", [10, 450])
+@pytest.mark.parametrize("count", [10, 187, 250, 450])
 def test_few_transitions_and_a_young_buffer_are_no_batch(count: int, run: Any) -> None:
     found = first(None, [each[-count:] for each in buffer_of(run)])
     assert not found.startswith("forgetting")
@@ -454,17 +454,29 @@ def test_random_actions_may_be_held_for_some_steps(falls: int) -> None:
     assert first(record_run(act, episodes=40, epsilon=lambda done: 0)) == "nothing"
 
 
-@pytest.mark.parametrize("epsilon", [0.1, 0.15])
-def test_each_action_may_last_for_some_steps(epsilon: float) -> None:
+@pytest.mark.parametrize("epsilon", [0.02, 0.15, 1.0])
+@pytest.mark.parametrize("lasting", [2, 3, 8])
+def test_each_action_may_last_for_some_steps(lasting: int, epsilon: float) -> None:
+    """Then it shows neither which actions are random nor which values the next step has."""
     steps, random, held = count(), np.random.RandomState(1), [0.0]
 
     def act(observation: Any) -> float:
-        if next(steps) % 2 == 0:
+        if next(steps) % lasting == 0:
             explores = random.random_sample() < epsilon
             held[0] = random.choice(TORQUES) if explores else swing_up(observation)
         return held[0]
 
-    assert first(record_run(act, epsilon=lambda done: 0)) != "exploration"
+    record = make_record(record_run(act, 50, epsilon=lambda done: 0), None, TORQUES, PENDULUM)
+    assert record is not None and record.played is not None
+    assert record.played.action_steps() == lasting
+    found = find(measure(bad_values, record))
+    assert [finding.title for finding in found] == ["not-converged (lasting-actions)"]
+    assert found[0].evidence == f"each recorded action lasts for {lasting} steps"
+
+
+def test_usual_actions_do_not_last() -> None:
+    for run in record_run(), record_run(episodes=50, epsilon=lambda done: 0.0):
+        assert PlayedSteps.of(run.steps, TORQUES, PENDULUM).action_steps() == 1
 
 
 def test_record_may_be_a_file_and_on_the_command_line(
