@@ -1,4 +1,4 @@
-"""Reads and writes the layers of a feed-forward network in an HDF5 file of Keras.
+"""Reads the layers of a feed-forward network in an HDF5 file of Keras.
 
 Keras loads some wrong files in part, and others without an error. Here layers are returned only
 when the file records their order or their sizes determine it, when they are finite floating-point

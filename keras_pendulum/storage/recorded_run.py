@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,11 +50,6 @@ class RecordedRun:
     replay: Transitions  # [N, ...], the replay buffer, oldest first
     layers: list[Layer]  # of the online network
     state: dict[str, Any]  # further JSON, such as that of the random-number generators
-
-    @property
-    def updates(self) -> int:
-        """The number of updates."""
-        return self.history[-1].updates if self.history else 0
 
 
 def load_recorded_run(path: str | os.PathLike[str]) -> RecordedRun:
@@ -122,13 +116,6 @@ def _read_config(state: dict[str, Any], path: str) -> Config:
         return read_settings(values)
     except ConfigError as error:
         raise WeightsError(f"{path}: records settings that no run can have ({error})") from error
-
-
-def read_arrays(file: H5File, group: str) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yields the arrays of a group, by name."""
-    for name in file.shapes:
-        if name.startswith(f"{group}/"):
-            yield name.removeprefix(f"{group}/"), file.read(name)
 
 
 def history_arrays(history: list[EpisodeRecord]) -> dict[str, NDArray[np.float64]]:

@@ -45,11 +45,13 @@ class RunFolder:
         # The real path: a link that changes during the run must not change the folder.
         self._real_path = Path(os.path.realpath(path))
         networks = {name: _network_files(self._real_path, task) for name, task in TASKS.items()}
-        self.weights, self.best, self.snapshots = networks.pop(environment)
-        self._others = [*itertools.chain(*networks.values())]  # of a run in another environment
+        self.weights, self.best, self.snapshots = networks[environment]
         self.history = self._real_path / "history.csv"
         self.config = self._real_path / "config.json"
         self.picture = self._real_path / "rewards.png"
+        # Of a finished run; `best` is there only with `keep_best`, `snapshots` with `snapshots`.
+        self.files = [*networks.pop(environment), self.history, self.config, self.picture]
+        self._others = [*itertools.chain(*networks.values())]  # of a run in another environment
         self.events = self._real_path / "tensorboard"
         self._evaluated = False  # whether history.csv has the column of the evaluations
         self.require_not_moved: Callable[[], None] = lambda: None  # see folder_lock.lock_folder
@@ -58,26 +60,15 @@ class RunFolder:
             require_regular(*(self.path / file.name for file in (*self.files, *self._others)))
             require_folder(self.path / self.events.name)
 
-    @property
-    def files(self) -> list[Path]:
-        """The files that a finished run leaves in the folder.
-
-        The second is there only with `keep_best`, the third only with `snapshots`.
-        """
-        files = [self.weights, self.best, self.snapshots]
-        return [*files, self.history, self.config, self.picture]
-
-    def create(self) -> None:
-        """Creates the folder if it does not exist. Raises UserError when that fails."""
-        with report_os_error(f"cannot make the folder {self.path}"):
-            self._real_path.mkdir(parents=True, exist_ok=True)
-
     @contextlib.contextmanager
     def lock(self) -> Iterator[None]:
-        """Locks the folder against other runs; the system releases the lock of a killed run.
+        """Locks the folder against other runs, and creates it if it does not exist.
 
-        Raises UserError when another run holds the lock.
+        The system releases the lock of a killed run. Raises UserError when another run holds the
+        lock, or when the folder cannot be created.
         """
+        with report_os_error(f"cannot make the folder {self.path}"):
+            self._real_path.mkdir(parents=True, exist_ok=True)
         with lock_folder(self._real_path) as self.require_not_moved:
             yield
 

@@ -50,12 +50,7 @@ class RunInfo:
             settings = json.loads(record.get("config") or "{}")
         except (TypeError, ValueError, RecursionError):
             settings = {}
-        return cls(
-            task,
-            preset,
-            seed,
-            settings if isinstance(settings, dict) else {},
-        )
+        return cls(task, preset, seed, settings if isinstance(settings, dict) else {})
 
     @property
     def discount(self) -> float | None:

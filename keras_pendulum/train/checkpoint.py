@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from keras_pendulum.config.config import Config
 from keras_pendulum.dqn.agent import Variables
 from keras_pendulum.errors import ConfigError, WeightsError, require_finite
+from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.checksum import write_with_checksum
 from keras_pendulum.storage.keras_h5 import require_sane
-from keras_pendulum.storage.quarantine import open_h5, report_damage
-from keras_pendulum.storage.recorded_run import history_arrays, read_arrays, read_run
+from keras_pendulum.storage.quarantine import H5File, open_h5, report_damage
+from keras_pendulum.storage.recorded_run import history_arrays, read_run
 from keras_pendulum.storage.save_weights import changed_versions, encode_weights
 from keras_pendulum.train.run import Run, make_run
 
@@ -108,6 +109,12 @@ def _dataset_names(variables: Variables) -> Variables:
     return {path.replace("/", "."): array for path, array in variables.items()}
 
 
+def _read_variables(file: H5File, group: str) -> Variables:
+    """Returns the variables of a group by their paths; see `_dataset_names`."""
+    names = [name for name in file.shapes if name.startswith(f"{group}/")]
+    return {name.removeprefix(f"{group}/").replace(".", "/"): file.read(name) for name in names}
+
+
 def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool = False) -> Run:
     """Returns the run in a checkpoint, ready to continue; with `render`, it has a window.
 
@@ -132,10 +139,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
                 f"{path}: this run has {episodes} episodes already; episodes is "
                 f"{config.episodes}, expected at least {episodes}"
             )
-        agent = {
-            group: {name.replace(".", "/"): array for name, array in read_arrays(file, group)}
-            for group in ("target", "optimizer")
-        }
+        agent = {group: _read_variables(file, group) for group in ("target", "optimizer")}
         for name, array in agent["target"].items():
             require_sane(array, f"target/{name}", path)
         if versions := changed_versions(file):
@@ -156,7 +160,7 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
             run.agent.set_state({"online": dict(zip(paths, weights, strict=True)), **agent})
         except ValueError as error:
             raise WeightsError(f"{os.fsdecode(path)}: cannot be resumed, {error}") from error
-        _check_optimizer(agent["optimizer"], recorded.updates)
+        _check_optimizer(agent["optimizer"], recorded.history)
         state = recorded.state
         run.replay.set_state({"added": state["replay_added"], **recorded.replay._asdict()})
         run.streams.set_state(state["random"])
@@ -165,8 +169,9 @@ def load_checkpoint(path: str | os.PathLike[str], config: Config, render: bool =
     return run
 
 
-def _check_optimizer(variables: Variables, updates: int) -> None:
-    """Raises ValueError for variables that no optimizer has after so many updates."""
+def _check_optimizer(variables: Variables, history: list[EpisodeRecord]) -> None:
+    """Raises ValueError for variables that no optimizer has after the updates of a run."""
+    updates = history[-1].updates if history else 0
     for name, array in variables.items():
         if name.endswith("iteration") and (array.dtype.kind != "i" or (array != updates).any()):
             raise ValueError(f"optimizer/{name} is {array}; its history has {updates} updates")

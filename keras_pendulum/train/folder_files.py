@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from keras_pendulum.dqn.network import DQN
 from keras_pendulum.errors import WeightsError
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.quarantine import open_h5
@@ -15,7 +14,7 @@ from keras_pendulum.storage.run_folder import RunFolder
 from keras_pendulum.storage.save_weights import encode_weights
 from keras_pendulum.storage.snapshots import encode_snapshots, read_snapshots, take_snapshot
 from keras_pendulum.train.checkpoint import CheckpointWriter
-from keras_pendulum.train.listeners import Listener
+from keras_pendulum.train.listeners import FunctionListener, Listener
 from keras_pendulum.train.run import Run
 
 
@@ -33,27 +32,15 @@ def run_listeners(
 
     Raises WeightsError when a file of a resumed run is damaged or belongs to another run.
     """
-    history = HistoryFile(run, folder)
+    history = FunctionListener(
+        on_episode=folder.append,
+        on_checkpoint=lambda network, episode: folder.restore_history(run.history),
+    )
     best = BestWeightsFile(run, folder, writer) if run.config.keep_best else None
     snapshots = SnapshotsFile(run, folder, writer) if run.config.snapshots else None
     checkpoint = CheckpointFile(run, writer, best, [history, *others])
     files = (history, snapshots, checkpoint, best)
     return [*(file for file in files if file is not None), *others]
-
-
-class HistoryFile(Listener):
-    """Adds each record to history.csv, and writes the file again where it was removed."""
-
-    def __init__(self, run: Run, folder: RunFolder) -> None:
-        self._run, self._folder = run, folder
-
-    def on_episode(self, record: EpisodeRecord) -> None:
-        """Adds the row of an episode."""
-        self._folder.append(record)
-
-    def on_checkpoint(self, network: DQN, episode: int) -> None:
-        """Restores the file."""
-        self._folder.restore_history(self._run.history)
 
 
 class SnapshotsFile(Listener):

@@ -89,15 +89,11 @@ class TensorBoardLog(Listener):
         import tensorflow as tf
         from tensorboard.plugins.hparams import api
 
+        settings = {  # in the types that TensorBoard's table of runs takes
+            name: value if isinstance(value, bool | int | float) else format_value(value)
+            for name, value in vars(self._config).items()
+        }
         writer = tf.summary.create_file_writer(self._folder)
         with writer.as_default(step=0):
-            api.hparams(_hparams(self._config))
+            api.hparams(settings)
         return writer
-
-
-def _hparams(config: Config) -> dict[str, bool | float | str]:
-    """Returns the settings in the types that TensorBoard's table of runs takes."""
-    return {
-        name: value if isinstance(value, bool | int | float) else format_value(value)
-        for name, value in vars(config).items()
-    }

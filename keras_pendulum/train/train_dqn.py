@@ -106,7 +106,6 @@ def train_dqn(
             run = make_run(config, init, render)
             stack.callback(run.env.close)
             if folder is not None:
-                folder.create()
                 stack.enter_context(folder.lock())
                 folder.require_unused(overwrite)
                 # The checkpoint comes before the other files: a run killed now can be resumed, and
