@@ -6,7 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+
+from keras_pendulum.train.run import Run
 
 # A run of the pendulum with updates from episode 2 on.
 SHORT: dict[str, Any] = {"hidden_units": (8,), "max_episode_steps": 20, "warmup_episodes": 2}
@@ -27,6 +30,21 @@ def kill_at_call(owner: Any, name: str, call: int, patched: pytest.MonkeyPatch) 
         return function(*arguments, **named)
 
     patched.setattr(owner, name, wrapped)
+
+
+def assert_same_state(ours: Run, theirs: Run) -> None:
+    """Compares two runs after their last episodes, but for the wall-clock times."""
+    states = [
+        (
+            [record._replace(seconds=0.0) for record in run.history],
+            run.agent.get_state(),
+            run.replay.get_state(),
+            run.streams.get_state(),
+            run.env.unwrapped.np_random.bit_generator.state,
+        )
+        for run in (ours, theirs)
+    ]
+    np.testing.assert_equal(*states)
 
 
 def contents(folder: Path) -> dict[Path, bytes]:

@@ -87,12 +87,6 @@ def test_extended_run_continues_from_the_averaged_weights_at_the_rate_of_the_lon
     assert float(run.agent.optimizer.learning_rate) == pytest.approx(config.learning_rate / 2)
 
 
-def test_file_without_a_run_cannot_be_resumed(tmp_path: Path) -> None:
-    kp.save_weights(kp.DQN((8,)), tmp_path / "pendulum_weight.h5")
-    with pytest.raises(kp.WeightsError, match=r"weights without a run .* use --init"):
-        kp.train_dqn(kp.preset("original"), tmp_path, resume=True)
-
-
 def test_checkpoint_stores_each_variable_under_its_keras_path(tmp_path: Path) -> None:
     run = make_run(kp.preset("reference", hidden_units=(8,), episodes=1, warmup_episodes=0))
     list(train_episodes(run))
@@ -106,18 +100,6 @@ def test_checkpoint_stores_each_variable_under_its_keras_path(tmp_path: Path) ->
             for name, array in found.items():
                 np.testing.assert_array_equal(array, state[group][name])
                 assert array.dtype == state[group][name].dtype
-
-
-def test_checkpoint_holds_the_evaluations(tmp_path: Path) -> None:
-    config = kp.preset("original", episodes=3, **SHORT)
-    run = make_run(config)
-    list(train_episodes(run))
-    run.history[1] = run.history[1]._replace(greedy_regret=0.1)
-    save_checkpoint(run, tmp_path / "a.h5")
-    with h5py.File(tmp_path / "a.h5") as file:
-        assert file["run/history"].shape == (3, 8)
-        assert file["run/evaluations"][()].tolist() == [[1.0, 0.1]]
-    np.testing.assert_array_equal(load_checkpoint(tmp_path / "a.h5", config).history, run.history)
 
 
 def test_checkpoint_written_during_the_run_holds_the_state_at_save(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import command_line
+from short_runs import assert_same_state
 
 import keras_pendulum as kp
 from keras_pendulum.config.fields import format_value
@@ -75,13 +76,7 @@ def test_killed_and_resumed_run_equals_an_uninterrupted_run(name: str, resumed_r
     for record in train_episodes(uninterrupted, greedy_regret):
         if record.greedy_regret <= regret:
             regret, best = record.greedy_regret, uninterrupted.agent.online.get_weights()
-    np.testing.assert_array_equal(
-        [record._replace(seconds=0.0) for record in resumed.history],
-        [record._replace(seconds=0.0) for record in uninterrupted.history],
-    )
-    np.testing.assert_equal(resumed.agent.get_state(), uninterrupted.agent.get_state())
-    np.testing.assert_equal(resumed.replay.get_state(), uninterrupted.replay.get_state())
-    assert resumed.streams.get_state() == uninterrupted.streams.get_state()
+    assert_same_state(resumed, uninterrupted)
     assert folder.best.exists() == config.keep_best == (best is not None)
     if best is not None:
         np.testing.assert_equal(kp.load_weights(folder.best).get_weights(), best)

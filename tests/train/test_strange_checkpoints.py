@@ -84,7 +84,7 @@ def missing(name: str) -> Change:
 
 HISTORY, EVALUATIONS = "run/history", "run/evaluations"
 STRANGE: dict[str, tuple[Change, str]] = {  # and what the message says
-    "no run": (missing("run"), "weights without a run"),
+    "no run": (missing("run"), "weights without a run to resume; use --init"),
     "no state": (missing("run/state"), "has no array run/state"),
     "no history": (missing(HISTORY), "has no array run/history"),
     "state is a group": (
@@ -154,14 +154,6 @@ def test_strange_checkpoint_is_refused_in_one_line(kind: str, run: Path) -> None
     with pytest.raises(kp.WeightsError, match=rf"pendulum_weight\.h5: .*{message}") as caught:
         load_recorded_run(run / FILE)
     assert str(caught.value).isprintable()
-
-
-def test_sound_checkpoint_is_read_by_all(run: Path) -> None:
-    recorded = load_recorded_run(run / FILE)
-    assert [record.episode for record in recorded.history] == [0, 1, 2]
-    assert np.isnan(recorded.history[0].loss)
-    assert recorded.config == CONFIG
-    assert recorded.replay.action.shape == (600,)
 
 
 def test_every_reader_refuses_a_strange_checkpoint(
@@ -258,11 +250,6 @@ def test_resuming_with_another_setting_raises_and_names_it(
     message = f"this run has {name} {getattr(CONFIG, name)}, not {other}: "
     with pytest.raises(kp.ConfigError, match=re.escape(message)):
         load_checkpoint(folder / FILE, CONFIG.change(**{name: other}))
-
-
-def test_resumed_run_can_be_saved_and_evaluated_at_other_episodes(folder: Path) -> None:
-    other = CONFIG.change(save_every=3, episodes=4, evaluate_every=2, keep_best=True, snapshots=0)
-    assert load_checkpoint(folder / FILE, other).config == other
 
 
 def test_resumed_run_cannot_be_shorter_than_it_is(run: Path) -> None:
