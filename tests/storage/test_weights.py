@@ -16,6 +16,7 @@ import pytest
 import tensorflow as tf
 
 import keras_pendulum as kp
+from benchmarks.files.keras_networks import HEAD, dense, sequential, subclassed
 from keras_pendulum.storage.keras_h5 import _split
 
 pytestmark = pytest.mark.usefixtures("files_read_here")
@@ -31,38 +32,6 @@ def network() -> kp.DQN:
         "config": '{"seed": 7}',
     }
     return kp.DQN((16, 8), 5, seed=3, metadata=metadata)
-
-
-def dense_layers(keras_module: Any) -> list[Any]:
-    layers = [keras_module.layers.Dense(units, activation="tanh") for units in (16, 8)]
-    return [*layers, keras_module.layers.Dense(5)]
-
-
-def subclassed(keras_module: Any) -> Any:
-    """Returns a subclassed model, as the original's, in either version of Keras."""
-
-    class Model(keras_module.Model):
-        def __init__(self) -> None:
-            super().__init__()
-            self.all = dense_layers(keras_module)
-
-        def call(self, inputs: Any) -> Any:
-            for layer in self.all:
-                inputs = layer(inputs)
-            return inputs
-
-    model = Model()
-    model(OBSERVATIONS)
-    return model
-
-
-def sequential(keras_module: Any) -> Any:
-    return keras_module.Sequential([keras_module.Input((3,)), *dense_layers(keras_module)])
-
-
-@pytest.fixture(scope="module")
-def keras2() -> Any:
-    return pytest.importorskip("tf_keras", reason="Keras 2 comes with the extra `test`")
 
 
 def assert_same_values(found: Any, expected: Any, tolerance: float = 0) -> None:
@@ -101,10 +70,13 @@ def test_file_records_the_versions_of_the_packages_and_the_number_of_threads(
     assert found == {"python": python, "tensorflow": tf.__version__, **packages, **threads}
 
 
-def test_keras_2_and_3_load_a_checkpoint(keras2: Any, tmp_path: Path) -> None:
+def test_keras_2_and_3_load_a_checkpoint(tmp_path: Path) -> None:
+    keras2 = pytest.importorskip("tf_keras", reason="Keras 2 comes with the extra `test`")
+    layers = [dense(16), dense(8), HEAD]
+    builds = (sequential(*layers), subclassed({"all": layers}))  # as the original's
     config = kp.preset("reference", episodes=1, hidden_units=(16, 8), torque_count=5)
     result = kp.train_dqn(config, tmp_path)
-    for model in (make(module) for make in (subclassed, sequential) for module in (keras, keras2)):
+    for model in (build(module) for build in builds for module in (keras, keras2)):
         model.load_weights(str(tmp_path / "pendulum_weight.h5"))
         assert_same_values(model, result.network, 1e-6)
 
@@ -127,16 +99,12 @@ def make_changed(change: Callable[[h5py.File], None]) -> Callable[[Path], None]:
     return make
 
 
-def replace_array(name: str, array: Any, **options: Any) -> Callable[[h5py.File], None]:
+def replace_array(name: str, array: Any) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         del file[name]
-        file.create_dataset(name, data=array, **options)
+        file[name] = array
 
     return change
-
-
-def set_value(file: h5py.File, value: float) -> None:
-    file["dense/dense/kernel:0"][1, 2] = value
 
 
 def attribute(name: str, value: object) -> Callable[[Path], None]:
@@ -146,7 +114,6 @@ def attribute(name: str, value: object) -> Callable[[Path], None]:
 
 KERNEL, BIAS = "dense_1/dense_1/kernel:0", "dense_1/dense_1/bias:0"
 BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
-    "text": (lambda path: path.write_text("plain text"), "not an HDF5 file"),
     "no layers": (lambda path: h5py.File(path, "w").close(), "holds no network weights"),
     "other data": (make_changed(lambda f: f.attrs.pop("layer_names")), "no network weights"),
     "wrong width": (
@@ -155,17 +122,9 @@ BAD_FILES: dict[str, tuple[Callable[[Path], Any], str]] = {
     ),
     "wrong bias": (make_changed(replace_array(BIAS, np.zeros(9, "f4"))), "expected a kernel"),
     "missing bias": (make_changed(lambda f: f.__delitem__(BIAS)), f"has no array {BIAS}"),
-    "too large for float32": (
-        make_changed(replace_array(KERNEL, np.full((16, 8), 1e300))),
-        "NaN or infinite",
-    ),
     "integers": (
         make_changed(replace_array(KERNEL, np.zeros((16, 8), "i4"))),
         "expected floating-point",
-    ),
-    "compressed": (
-        make_changed(replace_array(KERNEL, np.zeros((16, 8), "f4"), compression="gzip")),
-        "not a plain array",
     ),
     "activation": (attribute("activation", "elu"), "records the activation 'elu'"),
     "other environment": (
@@ -185,13 +144,13 @@ def test_bad_file_is_refused_in_one_line_that_names_it(kind: str, tmp_path: Path
     path = tmp_path / "bad.h5"
     make, message = BAD_FILES[kind]
     make(path)
-    before = path.read_bytes() if path.is_file() else None
+    before = path.read_bytes()
     with pytest.raises(kp.WeightsError) as caught:
         kp.load_weights(path)
     assert message in str(caught.value)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert (path.read_bytes() if path.is_file() else None) == before
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize(
@@ -251,8 +210,7 @@ def test_keras_file_of_a_dqn_loads_with_its_metadata(tmp_path: Path) -> None:
 
 
 def test_activation_is_for_files_that_record_none(tmp_path: Path) -> None:
-    model = sequential(keras)
-    model.save_weights(tmp_path / "a.weights.h5")
+    sequential(dense(8), HEAD)(keras).save_weights(tmp_path / "a.weights.h5")
     assert kp.load_weights(tmp_path / "a.weights.h5", "relu").activation == "relu"
     kp.save_weights(kp.DQN((8,), activation="relu"), tmp_path / "b.h5")
     assert kp.load_weights(tmp_path / "b.h5", "relu").activation == "relu"
