@@ -23,15 +23,15 @@ STORAGE_TESTS = Path(__file__).parents[2] / "tests" / "storage"
 def main(count: str = "2500") -> int:
     """Writes the files, measures them and writes the table; returns the exit status."""
     sys.path.insert(0, str(STORAGE_TESTS))
-    from fuzz_files import LAYOUTS, fuzz, measure_hostile_files
-    from hostile_files import write_sound
+    from fuzz_files import fuzz, measure_hostile_files
+    from hostile_files import LAYOUTS, write_sound
     from load_files import Loader
 
     from keras_pendulum.storage.quarantine import SECONDS
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with Loader(write_sound(folder / "first.h5", "this package"), 10, SECONDS) as loader:
+        with Loader(write_sound("this package", folder / "first"), 10, SECONDS) as loader:
             found = [fuzz(layout, int(count), loader, folder) for layout in LAYOUTS]
             found += measure_hostile_files(loader, folder)
     rows = [row for row, _ in found]

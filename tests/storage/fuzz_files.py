@@ -14,10 +14,9 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from hostile_files import HOSTILE, KERNEL, read_members, write, write_members, write_sound
+from hostile_files import HOSTILE, LAYOUTS, read_members, write, write_members, write_sound
 from load_files import Loader, Outcome
 
-LAYOUTS = (*KERNEL, "keras")
 Row = dict[str, Any]
 _STRUCTURES = re.compile(rb"TREE|HEAP|SNOD|GCOL|OHDR|FRHP|BTHD|PK\x03\x04|PK\x01\x02|PK\x05\x06")
 
@@ -125,9 +124,8 @@ def _kind(outcome: Outcome, expected: str, path: Path) -> str:
 
 def fuzz(layout: str, count: int, loader: Loader, folder: Path) -> tuple[Row, Failures]:
     """Loads `count` damaged files of a layout; returns their `summary`, which names the seeds."""
-    suffix = ".keras" if layout == "keras" else ".h5"
-    sound = write_sound(folder / f"sound{suffix}", layout)
-    damaged = folder / f"damaged{suffix}"
+    sound = write_sound(layout, folder)
+    damaged = sound.with_stem("damaged")
     expected = loader.load(sound).text
     loads: Loads = []
     for i in range(count):
@@ -143,11 +141,7 @@ def measure_hostile_files(loader: Loader, folder: Path) -> Iterator[tuple[Row, F
     kinds: dict[str, list[str]] = {}
     for kind, layout in HOSTILE:
         kinds.setdefault(kind, []).append(layout)
-    sound = {
-        layout: write_sound(folder / f"{i}{'.keras' if layout == 'keras' else '.h5'}", layout)
-        for i, layout in enumerate(LAYOUTS)
-    }
-    expected = {layout: loader.load(path).text for layout, path in sound.items()}
+    expected = {layout: loader.load(write_sound(layout, folder)).text for layout in LAYOUTS}
     for kind, layouts in kinds.items():
         loads: Loads = []
         for layout in layouts:

@@ -27,7 +27,9 @@ KERNEL = {
     "whole model": "model_weights/one/sequential/one/kernel",
     "Keras 3": "layers/dense/vars/0",
 }
+LAYOUTS = (*KERNEL, "keras")  # the last one is the zip file `.keras`
 Change = Callable[[Path, str], None]  # changes the file of a layout
+Members = dict[str, bytes]  # of a zip file
 
 
 def network() -> Any:
@@ -46,11 +48,10 @@ def network() -> Any:
     return model
 
 
-def write_sound(path: Path, layout: str) -> Path:
-    """Writes a file of a layout that loads, without a checksum.
-
-    The layouts are those of KERNEL, which are HDF5 files, and "keras", the zip file `.keras`.
-    """
+def write_sound(layout: str, folder: Path) -> Path:
+    """Writes a file of a layout that loads, without a checksum; returns its path."""
+    folder.mkdir(exist_ok=True)
+    path = folder / ("a.keras" if layout == "keras" else "a.h5")
     path.write_bytes(_sound(layout))
     return path
 
@@ -357,23 +358,24 @@ CONFIGS: dict[str, bytes] = {
 # Zip files.
 
 
-def packed(change: Callable[[dict[str, bytes]], None]) -> Change:
+def packed(change: Callable[[Members], object]) -> Change:
     """Returns a change of the members of a zip file."""
-
-    def change_file(path: Path, layout: str) -> None:
-        members = read_members(path)
-        change(members)
-        write_members(path, members)
-
-    return change_file
+    return lambda path, layout: change_members(path, change)
 
 
-def read_members(path: Path) -> dict[str, bytes]:
+def change_members(path: Path, change: Callable[[Members], object]) -> None:
+    """Changes the members of a zip file."""
+    members = read_members(path)
+    change(members)
+    write_members(path, members)
+
+
+def read_members(path: Path) -> Members:
     with zipfile.ZipFile(path) as file:
         return {name: file.read(name) for name in file.namelist()}
 
 
-def write_members(path: Path, members: dict[str, bytes]) -> None:
+def write_members(path: Path, members: Members) -> None:
     """Writes a zip file. As in files of Keras, only members of many MB are compressed."""
     with zipfile.ZipFile(path, "w") as file:
         for name, content in members.items():
@@ -389,15 +391,15 @@ def removed(name: str) -> Change:
     return packed(lambda members: members.__delitem__(name) if name in members else None)
 
 
-def edited(edit: Callable[[Any], None]) -> Change:
-    """Returns a change of the settings in `config.json`."""
+def edited(edit: Callable[[Any], object]) -> Callable[[Members], None]:
+    """Returns a change of the settings in the member `config.json`."""
 
-    def change(members: dict[str, bytes]) -> None:
+    def change(members: Members) -> None:
         config = json.loads(members["config.json"])
         edit(config)
         members["config.json"] = json.dumps(config).encode()
 
-    return packed(change)
+    return change
 
 
 def bomb(name: str) -> Change:
@@ -435,16 +437,14 @@ def other_config_first(path: Path, layout: str) -> None:
 def weights_of(change: Change) -> Change:
     """Returns a change of the HDF5 file in the zip file."""
 
-    def change_file(path: Path, layout: str) -> None:
-        members = read_members(path)
-        inner = path.with_suffix(".inner.h5")
-        inner.write_bytes(members["model.weights.h5"])
-        change(inner, "Keras 3")
-        members["model.weights.h5"] = inner.read_bytes()
-        inner.unlink()
-        write_members(path, members)
+    def change_weights(members: Members) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            inner = Path(folder, "inner.h5")
+            inner.write_bytes(members["model.weights.h5"])
+            change(inner, "Keras 3")
+            members["model.weights.h5"] = inner.read_bytes()
 
-    return change_file
+    return packed(change_weights)
 
 
 def repeat_layer(config: Any) -> None:
@@ -456,7 +456,7 @@ def rename_layer(name: str) -> Change:
         layer = config["config"]["layers"][1]
         layer["class_name"], layer["config"]["name"] = "LeakyReLU", name
 
-    return edited(rename)
+    return packed(edited(rename))
 
 
 def add_activations(config: Any) -> None:
@@ -487,8 +487,8 @@ BY_ZIP: dict[str, Change] = {
     "weights that are no HDF5": member("model.weights.h5", b"text"),
     "half a zip file": resized(lambda size: size // 2),
     "a zip file without its end": resized(lambda size: size - 30),
-    "a layer 3000 times": edited(repeat_layer),
-    "100 000 layers": edited(add_activations),
+    "a layer 3000 times": packed(edited(repeat_layer)),
+    "100 000 layers": packed(edited(add_activations)),
     "a name with escapes": rename_layer("a\x1b[31m\nerror: b\r\u202e"),
     "a name of a million letters": rename_layer("a" * 10**6),
     "a B-tree node that is its child": weights_of(patched(tree_child_is_itself)),
@@ -516,6 +516,6 @@ HOSTILE: dict[tuple[str, str], Change] = {
 
 def write(kind: str, layout: str, folder: Path) -> Path:
     """Writes a hostile file; returns its path."""
-    path = write_sound(folder / ("a.keras" if layout == "keras" else "a.h5"), layout)
+    path = write_sound(layout, folder)
     HOSTILE[kind, layout](path, layout)
     return path

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import h5py
 import keras
 import numpy as np
-from hostile_files import read_members, write_members
+from hostile_files import Members, edited
 
 L = keras.layers
-Change = Callable[[dict[str, bytes]], object]  # of the members of the archive
+Change = Callable[[Members], object]  # of the archive
 
 
 def sound_model() -> Any:
@@ -28,28 +26,15 @@ def sound_model() -> Any:
     return keras.Model(inputs, L.Add(name="q")([value, advantage - mean]))
 
 
-def change_members(path: Path, change: Change) -> None:
-    """Changes the members of a `.keras` file."""
-    members = read_members(path)
-    change(members)
-    write_members(path, members)
-
-
 def config(change: Callable[[list[Any]], object]) -> Change:
     """Returns a change of the list of layers."""
-
-    def apply(members: dict[str, bytes]) -> None:
-        settings = json.loads(members["config.json"])
-        change(settings["config"]["layers"])
-        members["config.json"] = json.dumps(settings).encode()
-
-    return apply
+    return edited(lambda settings: change(settings["config"]["layers"]))
 
 
 def text(old: str, new: str) -> Change:
     """Returns a change of the text of the configuration."""
 
-    def apply(members: dict[str, bytes]) -> None:
+    def apply(members: Members) -> None:
         assert old.encode() in members["config.json"]
         members["config.json"] = members["config.json"].replace(old.encode(), new.encode())
 
@@ -77,7 +62,7 @@ def model_is(*layers: Any) -> Change:
 def weights(value: float) -> Change:
     """Returns a change of a weight."""
 
-    def apply(members: dict[str, bytes]) -> None:
+    def apply(members: Members) -> None:
         content = io.BytesIO(members["model.weights.h5"])
         with h5py.File(content, "r+") as file:
             file["layers/dense/vars/0"][0, 0] = value

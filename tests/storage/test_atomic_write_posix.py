@@ -15,7 +15,6 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from save_constantly import save_constantly
 
 import keras_pendulum as kp
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
@@ -28,6 +27,13 @@ import resource
 LARGE = 4_500_000  # bytes, as a checkpoint of `reference`
 
 
+def save_constantly(path: str, contents: list[bytes]) -> None:
+    """Writes each of the contents to `path`, again and again, until its process is killed."""
+    while True:
+        for content in contents:
+            write_atomically(path, content)
+
+
 @pytest.mark.slow
 def test_file_is_complete_after_each_of_100_kills(tmp_path: Path) -> None:
     path = tmp_path / "policy.h5"
@@ -36,7 +42,7 @@ def test_file_is_complete_after_each_of_100_kills(tmp_path: Path) -> None:
     random = Random(0)
     # The server has not imported TensorFlow, so its children start fast.
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["save_constantly"])
+    context.set_forkserver_preload([__name__])
     contents_found = []
     for _ in range(100):
         before = path.stat().st_mtime_ns

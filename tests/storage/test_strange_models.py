@@ -11,7 +11,8 @@ from typing import Any
 import keras
 import numpy as np
 import pytest
-from strange_models import STRANGE, change_members, sound_model, text
+from hostile_files import change_members
+from strange_models import STRANGE, sound_model, text
 
 import keras_pendulum as kp
 from keras_pendulum.evaluate.sources import load_keras_file
@@ -42,7 +43,6 @@ def test_model_with_layers_of_the_list_is_loaded(tmp_path: Path, temporary_folde
     assert list(temporary_folder.iterdir()) == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", STRANGE)
 def test_strange_model_is_refused_in_one_line(
     kind: str, tmp_path: Path, temporary_folder: Path

@@ -34,7 +34,7 @@ def kill_at_call(owner: Any, name: str, call: int, patched: pytest.MonkeyPatch) 
 
 def assert_same_state(ours: Run, theirs: Run) -> None:
     """Compares two runs after their last episodes, but for the wall-clock times."""
-    states = [
+    found, expected = (
         (
             [record._replace(seconds=0.0) for record in run.history],
             run.agent.get_state(),
@@ -43,8 +43,8 @@ def assert_same_state(ours: Run, theirs: Run) -> None:
             run.env.unwrapped.np_random.bit_generator.state,
         )
         for run in (ours, theirs)
-    ]
-    np.testing.assert_equal(*states)
+    )
+    np.testing.assert_equal(found, expected)
 
 
 def contents(folder: Path) -> dict[Path, bytes]:
