@@ -17,6 +17,7 @@ from typing import Any
 from hostile_files import HOSTILE, LAYOUTS, read_members, write, write_members, write_sound
 from load_files import Loader, Outcome
 
+LONGEST_MESSAGE = 1000  # characters beside the path
 Row = dict[str, Any]
 _STRUCTURES = re.compile(rb"TREE|HEAP|SNOD|GCOL|OHDR|FRHP|BTHD|PK\x03\x04|PK\x01\x02|PK\x05\x06")
 
@@ -89,7 +90,7 @@ def damage(sound: Path, damaged: Path, seed: str) -> None:
 
 
 Failures = list[tuple[str, Outcome]]
-Loads = list[tuple[str, str, Outcome]]  # name of the file, `_kind`, outcome
+Loads = list[tuple[str, str, Outcome]]  # name of the file, `kind_of`, outcome
 
 
 def summary(file: str, loads: Loads) -> tuple[Row, Failures]:
@@ -113,12 +114,17 @@ def summary(file: str, loads: Loads) -> tuple[Row, Failures]:
     return row, [(name, outcome) for name, kind, outcome in loads if kind in failed]
 
 
-def _kind(outcome: Outcome, expected: str, path: Path) -> str:
+def kind_of(outcome: Outcome, expected: str, path: Path) -> str:
+    """Returns the kind of an outcome: `equal` or `other` if the file was loaded.
+
+    It is `refused` only with one printable line that names the file, otherwise `failed`.
+    """
     if outcome.kind == "loaded":
         return "equal" if outcome.text == expected else "other"
     if outcome.kind == "refused":
-        one_line = outcome.text.isprintable() and str(path) in outcome.text
-        return "refused" if one_line else "failed"
+        message = outcome.text.replace(str(path), "", 1)
+        one_line = outcome.text.isprintable() and len(message) < LONGEST_MESSAGE
+        return "refused" if one_line and message != outcome.text else "failed"
     return outcome.kind
 
 
@@ -132,7 +138,7 @@ def fuzz(layout: str, count: int, loader: Loader, folder: Path) -> tuple[Row, Fa
         name = f"0 {layout} {i}"
         damage(sound, damaged, name)
         outcome = loader.load(damaged)
-        loads.append((name, _kind(outcome, expected, damaged), outcome))
+        loads.append((name, kind_of(outcome, expected, damaged), outcome))
     return summary(f"damaged at random, {layout}", loads)
 
 
@@ -147,6 +153,6 @@ def measure_hostile_files(loader: Loader, folder: Path) -> Iterator[tuple[Row, F
         for layout in layouts:
             path = write(kind, layout, folder)
             outcome = loader.load(path)
-            loads.append((f"{kind}, {layout}", _kind(outcome, expected[layout], path), outcome))
+            loads.append((f"{kind}, {layout}", kind_of(outcome, expected[layout], path), outcome))
             path.unlink()
         yield summary(kind, loads)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from random import Random
 
@@ -26,19 +27,12 @@ def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return (folder / "pendulum_weight.h5").read_bytes()
 
 
-def refused(load: Callable[[Path], object], path: Path, content: bytes | bytearray) -> bool:
+def check_refused(load: Callable[[Path], object], path: Path, content: bytes | bytearray) -> None:
     path.write_bytes(content)
-    try:
+    with pytest.raises(kp.WeightsError) as caught:
         load(path)
-    except kp.WeightsError as error:
-        assert str(path) in str(error)
-        assert "\n" not in str(error)
-        return True
-    return False
-
-
-def resume(path: Path) -> object:
-    return load_checkpoint(path, CONFIG)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def damaged(content: bytes | bytearray) -> bool:
@@ -57,8 +51,8 @@ def test_1000_flipped_bits_are_all_refused(checkpoint: bytes, tmp_path: Path) ->
         flipped[random.randrange(len(flipped))] ^= 1 << random.randrange(8)
         assert damaged(flipped)
         if i < 2:
-            for load in (kp.load_weights, resume):
-                assert refused(load, tmp_path / "flipped.h5", flipped)
+            for load in (kp.load_weights, partial(load_checkpoint, config=CONFIG)):
+                check_refused(load, tmp_path / "flipped.h5", flipped)
 
 
 @pytest.mark.parametrize("size", [1, 8, 512, 4096])
@@ -80,9 +74,10 @@ def test_truncated_files_and_bytes_behind_the_checksum_are_refused(
     for length in (*near_the_ends, len(checkpoint) - 1, *range(0, end, 4999)):
         assert damaged(checkpoint[:length]), length
     for length in (1, end // 2, end - 1):
-        assert refused(kp.load_weights, tmp_path / "short.h5", checkpoint[:length]), length
+        check_refused(kp.load_weights, tmp_path / "short.h5", checkpoint[:length])
 
 
 def test_file_without_checksum_loads(checkpoint: bytes, tmp_path: Path) -> None:
     end = checkpoint.rindex(b"\nkeras_pendulum sha256")
-    assert not refused(resume, tmp_path / "plain.h5", checkpoint[:end])
+    (tmp_path / "plain.h5").write_bytes(checkpoint[:end])
+    load_checkpoint(tmp_path / "plain.h5", CONFIG)

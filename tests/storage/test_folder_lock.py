@@ -26,12 +26,6 @@ def test_locked_folder_is_refused_until_the_lock_is_released(tmp_path: Path) -> 
         require_not_moved()
 
 
-def test_other_folders_stay_unlocked(tmp_path: Path) -> None:
-    (tmp_path / "inside").mkdir()
-    with lock_folder(tmp_path), lock_folder(tmp_path / "inside") as require_not_moved:
-        require_not_moved()
-
-
 def test_lock_is_released_and_its_file_removed_after_an_error(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), lock_folder(tmp_path):
         assert [file.name for file in tmp_path.iterdir()] == [LOCK_FILE]

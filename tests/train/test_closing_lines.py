@@ -26,22 +26,16 @@ def record(episode: int, updates: int, **changes: Any) -> EpisodeRecord:
 
 def lines_after(
     config: kp.Config,
-    last: EpisodeRecord,
-    folder: Path,
+    history: list[EpisodeRecord],
+    path: Path,
     *,
     score: kp.Score | None = None,
-    new_episodes: int = 1,
     finished: bool = True,
 ) -> list[str]:
-    result = kp.TrainingResult(kp.DQN((8,)), [last], finished, score)
-    return all_lines(config, result, RunFolder(folder, config.environment), new_episodes)
-
-
-def all_lines(
-    config: kp.Config, result: kp.TrainingResult, folder: RunFolder, new_episodes: int = 1
-) -> list[str]:
-    first = result_lines(config, result, folder, 1.5, new_episodes=new_episodes)
-    last = next_lines(config, result, folder, new_episodes=new_episodes)
+    result = kp.TrainingResult(kp.DQN((8,)), history, finished, score)
+    folder = RunFolder(path, config.environment)
+    first = result_lines(config, result, folder, 1.5, new_episodes=1)
+    last = next_lines(config, result, folder, new_episodes=1)
     return [*first.splitlines(), *last.splitlines()]
 
 
@@ -49,7 +43,7 @@ def warnings(config: kp.Config, last: EpisodeRecord, mean_return: float, folder:
     """Returns the lines between the return of random actions and the list of the files."""
     optimum = -36.68 if config.gravity is not None else 500.0
     score = kp.Score(config.task, np.array([mean_return]), np.array([optimum]))
-    lines = lines_after(config, last, folder, score=score)
+    lines = lines_after(config, [last], folder, score=score)
     first = next(i for i, line in enumerate(lines) if line.startswith("Uniformly random")) + 1
     return lines[first : next(i for i, line in enumerate(lines) if line.startswith("Saved in"))]
 
@@ -112,7 +106,7 @@ def test_policy_worse_than_random_actions_names_what_to_do(
 def test_regret_is_shown_in_two_parts(tmp_path: Path) -> None:
     optimum = kp.optimal_return(1.0, range(100))
     score = kp.Score(Pendulum(), optimum - 3, optimum, 0.9, range(100))
-    lines = lines_after(kp.preset("reference"), record(499, 100), tmp_path, score=score)
+    lines = lines_after(kp.preset("reference"), [record(499, 100)], tmp_path, score=score)
     place = lines.index("Regret: 3.00")
     assert lines[place + 1].startswith(
         "Exact policy for the discount 0.9: regret 0.24. Regret from learning: "
@@ -122,7 +116,7 @@ def test_regret_is_shown_in_two_parts(tmp_path: Path) -> None:
 
 def test_interrupted_run_is_not_judged_and_can_be_continued(tmp_path: Path) -> None:
     config = kp.preset("reference")
-    lines = lines_after(config, record(3, 0), tmp_path, finished=False)
+    lines = lines_after(config, [record(3, 0)], tmp_path, finished=False)
     assert lines[0] == "Interrupted after 4 episodes (800 steps, 0 updates); this took 1.5 s."
     assert [line.split(":")[0].split(" in ")[0] for line in lines[1:]] == ["Saved", "Continue"]
 
@@ -131,10 +125,8 @@ def test_evaluations_are_summed_up(tmp_path: Path) -> None:
     config = kp.preset("reference", evaluate_every=50, keep_best=True)
     regrets = [(49, 30.0), (99, 2.345), (149, 2.345), (199, 3.0)]
     history = [record(i, 100, greedy_regret=regret) for i, regret in regrets]
-    result = kp.TrainingResult(kp.DQN((8,)), history, True)
-    folder = RunFolder(tmp_path, config.environment)
-    folder.best.touch()
-    lines = all_lines(config, result, folder)
+    RunFolder(tmp_path, config.environment).best.touch()
+    lines = lines_after(config, history, tmp_path)
     assert lines[1] == (
         "Evaluated 4 times on the starts of seeds 900 to 949: best regret 2.35 after episode 149, "
         "last 3.00"
