@@ -16,6 +16,9 @@ from keras_pendulum.storage.atomic_write import write_atomically
 
 _LABEL = b"\nkeras_pendulum sha256 "
 _CHECKSUM_SIZE = len(_LABEL) + 64  # bytes
+# Where a file says that its HDF5 content ends, by the version of its superblock (HDF5 File Format
+# Specification, "Superblock").
+_PLACE_OF_THE_END = {0: 40, 1: 44, 2: 28, 3: 28}
 
 
 def write_with_checksum(
@@ -29,12 +32,15 @@ def write_with_checksum(
 
 
 def verify(content: bytes) -> None:
-    """Raises WeightsError when the content of a file does not match its checksum.
+    """Raises WeightsError when the content of an HDF5 file does not match its checksum.
 
     Accepts a file that ends with its HDF5 content: Keras writes no checksum.
     """
-    end = _end_of_content(content)
-    if end is None or len(content) <= end:
+    if len(content) < 64 or content[8] not in _PLACE_OF_THE_END:  # HDF5 itself refuses it
+        return
+    place = _PLACE_OF_THE_END[content[8]]
+    end = int.from_bytes(content[place : place + 8], "little")
+    if len(content) <= end:
         return
     checked = memoryview(content)[:-_CHECKSUM_SIZE]
     if content[len(checked) :] != _LABEL + hashlib.sha256(checked).hexdigest().encode():
@@ -42,14 +48,3 @@ def verify(content: bytes) -> None:
             "the file is damaged, or another program changed it (its SHA-256 differs from the "
             "recorded one)"
         )
-
-
-def _end_of_content(content: bytes) -> int | None:
-    """Returns where a file says that its HDF5 content ends, None if unknown.
-
-    HDF5 File Format Specification, "Superblock": the offset depends on the version.
-    """
-    if len(content) < 64 or not content.startswith(b"\x89HDF"):
-        return None
-    offset = {0: 40, 1: 44, 2: 28, 3: 28}.get(content[8])
-    return None if offset is None else int.from_bytes(content[offset : offset + 8], "little")

@@ -52,7 +52,8 @@ class SnapshotsFile(Listener):
 
     def __init__(self, run: Run, folder: RunFolder, writer: CheckpointWriter) -> None:
         self._run, self._path, self._writer = run, folder.snapshots, writer
-        self._due = due_episodes(run.config.snapshots, run.config.episodes)
+        count, episodes = run.config.snapshots, run.config.episodes
+        self._due = [round(i * episodes / (count - 1)) for i in range(count)]  # 0, …, `episodes`
         kept = []
         if self._path.exists():
             kept = read_snapshots(self._path, run.agent.online, run.history)
@@ -152,8 +153,3 @@ class BestWeightsFile(Listener):
             content = encode_weights(self._run.agent.online, evaluation=evaluation)
             self._writer.write(self._path, content)
             self._regret = record.greedy_regret
-
-
-def due_episodes(count: int, episodes: int) -> list[int]:
-    """Returns after how many episodes each of `count` networks is kept: 0, …, `episodes`."""
-    return [round(i * episodes / (count - 1)) for i in range(count)]

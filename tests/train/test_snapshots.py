@@ -18,7 +18,7 @@ from keras_pendulum.config.config import Config
 from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.storage.run_folder import RunFolder
 from keras_pendulum.storage.snapshots import Snapshot, read_snapshots
-from keras_pendulum.train.folder_files import SnapshotsFile, due_episodes
+from keras_pendulum.train.folder_files import SnapshotsFile
 
 FILE = "pendulum_weight_snapshots.h5"
 CONFIG = kp.preset("reference", episodes=12, snapshots=5, save_every=5, **SHORT)
@@ -45,12 +45,6 @@ def snapshots_in(folder: Path) -> list[Snapshot]:
     weights = folder / "pendulum_weight.h5"
     history = load_recorded_run(weights).history
     return read_snapshots(folder / FILE, kp.load_weights(weights), history)
-
-
-def test_due_episodes_are_evenly_spaced_from_the_initial_to_the_final_network() -> None:
-    assert due_episodes(5, 12) == [0, 3, 6, 9, 12]
-    assert due_episodes(2, 7) == [0, 7]
-    assert due_episodes(4, 3) == [0, 1, 2, 3]
 
 
 def test_snapshots_are_the_networks_of_the_run(
