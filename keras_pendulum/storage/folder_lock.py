@@ -10,7 +10,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from keras_pendulum.errors import UserError, report_os_error
+from keras_pendulum.errors import UserError
 
 LOCK_FILE = ".lock"
 # The errors of a file system without locks.
@@ -27,12 +27,10 @@ def lock_folder(folder: Path) -> Iterator[Callable[[], None]]:
     Yields a function that raises UserError when another folder, or none, is at this path now: the
     lock moves with the folder, and writing to the path would change files of another run.
 
-    Raises UserError when another run has the lock, or when the folder is missing or read-only.
+    Raises UserError when another run has the lock, or when the folder is read-only.
     """
     file = folder / LOCK_FILE
     lock = FileLock(file, blocking=False, fallback_to_soft=False)
-    with report_os_error(f"cannot read the folder {folder}"):
-        folder.stat()  # FileLock would create a missing folder
     try:
         lock.acquire()
     except Timeout as error:

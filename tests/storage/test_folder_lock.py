@@ -64,14 +64,6 @@ def test_lock_of_another_process_holds_until_the_process_is_killed(tmp_path: Pat
     assert list(folder.iterdir()) == []
 
 
-def test_missing_folder_is_refused_and_not_created(tmp_path: Path) -> None:
-    folder = tmp_path / "none"
-    message = "^cannot read the folder .*none: No such file or directory$"
-    with pytest.raises(kp.UserError, match=message), lock_folder(folder):
-        pass
-    assert not folder.exists()
-
-
 def test_folder_at_the_place_of_the_lock_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / LOCK_FILE).mkdir()
     with pytest.raises(kp.UserError, match=r"^cannot write .*\.lock: "), lock_folder(tmp_path):

@@ -22,16 +22,14 @@ from keras_pendulum.train.folder_files import SnapshotsFile
 
 FILE = "pendulum_weight_snapshots.h5"
 CONFIG = kp.preset("reference", episodes=12, snapshots=5, save_every=5, **SHORT)
-
-
+# Its result, its folder, and its weights after each episode.
+WholeRun = tuple[kp.TrainingResult, Path, dict[int, Any]]
 pytestmark = pytest.mark.usefixtures("short_ending")
 
 
 @pytest.fixture(scope="module")
-def whole_run(
-    short_ending: None, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[kp.TrainingResult, Path, dict[int, Any]]:
-    """A run that is not interrupted, its folder, and its weights after each episode."""
+def whole_run(short_ending: None, tmp_path_factory: pytest.TempPathFactory) -> WholeRun:
+    """A run that is not interrupted."""
     folder = tmp_path_factory.mktemp("whole")
     weights: dict[int, Any] = {}
     config = replace(CONFIG, save_every=1)
@@ -47,9 +45,7 @@ def snapshots_in(folder: Path) -> list[Snapshot]:
     return read_snapshots(folder / FILE, kp.load_weights(weights), history)
 
 
-def test_snapshots_are_the_networks_of_the_run(
-    whole_run: tuple[kp.TrainingResult, Path, dict[int, Any]],
-) -> None:
+def test_snapshots_are_the_networks_of_the_run(whole_run: WholeRun) -> None:
     result, folder, weights = whole_run
     found = snapshots_in(folder)
     assert [each.episodes for each in found] == [0, 3, 6, 9, 12]
@@ -62,9 +58,7 @@ def test_snapshots_are_the_networks_of_the_run(
     np.testing.assert_equal(newest.get_weights(), result.network.get_weights())
 
 
-def test_snapshots_change_nothing_in_the_run(
-    whole_run: tuple[kp.TrainingResult, Path, dict[int, Any]],
-) -> None:
+def test_snapshots_change_nothing_in_the_run(whole_run: WholeRun) -> None:
     assert_same(kp.train_dqn(replace(CONFIG, snapshots=0)), whole_run[0])
 
 
@@ -81,7 +75,7 @@ def test_killed_and_resumed_run_leaves_the_same_file(
     owner: Any,
     name: str,
     call: int,
-    whole_run: tuple[kp.TrainingResult, Path, dict[int, Any]],
+    whole_run: WholeRun,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
