@@ -26,6 +26,7 @@ from keras_pendulum.train.run import Run
 
 SEEDS = evaluations.SEEDS  # before the fixture below changes them
 FEW_STARTS = range(900, 903)
+Regrets = Callable[..., list[list[Any]]]
 pytestmark = pytest.mark.usefixtures("few_starts")
 
 
@@ -38,7 +39,7 @@ def few_starts(short_ending: None) -> Iterator[None]:
 
 
 @pytest.fixture
-def regrets(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[list[Any]]]:
+def regrets(monkeypatch: pytest.MonkeyPatch) -> Regrets:
     """Replaces the regrets of the next evaluations; returns the list of their weights."""
 
     def replace_by(*values: float) -> list[list[Any]]:
@@ -127,9 +128,7 @@ def test_history_has_the_regrets_of_evaluated_runs_only(tmp_path: Path) -> None:
     ]
 
 
-def test_best_weights_are_kept_beside_the_last(
-    tmp_path: Path, regrets: Callable[..., list[list[Any]]]
-) -> None:
+def test_best_weights_are_kept_beside_the_last(tmp_path: Path, regrets: Regrets) -> None:
     weights = regrets(9.0, 5.0, 7.0, 5.0, 6.0)
     config = kp.preset("reference", episodes=5, evaluate_every=1, keep_best=True, **SHORT)
     result = kp.train_dqn(config, tmp_path)
@@ -143,7 +142,7 @@ def test_best_weights_are_kept_beside_the_last(
 
 
 def test_run_killed_before_its_best_weights_are_written_writes_them_when_resumed(
-    tmp_path: Path, regrets: Callable[..., list[list[Any]]], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, regrets: Regrets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     weights = regrets(9.0, 5.0, 7.0, 6.0)
     config = kp.preset("reference", episodes=3, evaluate_every=1, keep_best=True, **SHORT)
@@ -162,7 +161,7 @@ def test_run_killed_before_its_best_weights_are_written_writes_them_when_resumed
 
 
 def test_run_that_asks_later_for_its_best_weights_begins_with_its_last_evaluation(
-    tmp_path: Path, regrets: Callable[..., list[list[Any]]]
+    tmp_path: Path, regrets: Regrets
 ) -> None:
     weights = regrets(1.0, 3.0, 4.0, 2.0)
     config = kp.preset("reference", episodes=2, evaluate_every=1, **SHORT)

@@ -42,8 +42,11 @@ class Terminal(io.TextIOWrapper):
         return [line.rstrip() for line in self.text().split("\r")[1:]]
 
 
+MakeTerminal = Callable[..., Terminal]
+
+
 @pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Terminal]:
+def terminal(monkeypatch: pytest.MonkeyPatch) -> MakeTerminal:
     """Returns a function that makes the output a terminal whose bar is drawn at each episode."""
 
     def make(columns: int = 200, encoding: str = "utf-8", term: str = "xterm") -> Terminal:
@@ -93,7 +96,7 @@ def figures(line: str) -> str:
     return line.split(" ", 3)[3]
 
 
-def test_bar_shows_speed_of_the_last_episodes(terminal: Callable[..., Terminal]) -> None:
+def test_bar_shows_speed_of_the_last_episodes(terminal: MakeTerminal) -> None:
     output = terminal()
     bar = make_progress(kp.preset("reference", episodes=100))
     for episode in range(13):
@@ -106,9 +109,7 @@ def test_bar_shows_speed_of_the_last_episodes(terminal: Callable[..., Terminal])
     assert figures(lines[1]) == f"return -4 ε 0.50 loss 0.1 {speed} 0:49 left"
 
 
-def test_time_left_is_shown_from_the_second_episode_with_updates(
-    terminal: Callable[..., Terminal],
-) -> None:
+def test_time_left_is_shown_from_the_second_episode_with_updates(terminal: MakeTerminal) -> None:
     output = terminal()
     bar = make_progress(kp.preset("reference", episodes=100))
     bar.on_episode(record(0, loss=float("nan"), seconds=0.01))
@@ -120,7 +121,7 @@ def test_time_left_is_shown_from_the_second_episode_with_updates(
     ]
 
 
-def test_time_left_is_never_0(terminal: Callable[..., Terminal]) -> None:
+def test_time_left_is_never_0(terminal: MakeTerminal) -> None:
     output = terminal()
     bar = make_progress(kp.preset("reference", episodes=5))
     for episode in range(5):
@@ -138,7 +139,7 @@ def test_time_left_is_never_0(terminal: Callable[..., Terminal]) -> None:
 
 
 def test_time_left_includes_the_remaining_evaluations(
-    terminal: Callable[..., Terminal], monkeypatch: pytest.MonkeyPatch
+    terminal: MakeTerminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = SimpleNamespace(now=100.0)
     clock.monotonic = lambda: clock.now
@@ -159,7 +160,7 @@ def test_time_left_includes_the_remaining_evaluations(
     assert "greedy 12.35 " in output.lines()[-1]
 
 
-def test_interrupted_run_has_no_time_left(terminal: Callable[..., Terminal]) -> None:
+def test_interrupted_run_has_no_time_left(terminal: MakeTerminal) -> None:
     output = terminal()
     bar = make_progress(kp.preset("reference", episodes=9))
     bar.on_episode(record(0))
@@ -171,9 +172,7 @@ def test_interrupted_run_has_no_time_left(terminal: Callable[..., Terminal]) -> 
     assert "left" not in last
 
 
-def test_end_ends_the_line_once_also_before_the_first_episode(
-    terminal: Callable[..., Terminal],
-) -> None:
+def test_end_ends_the_line_once_also_before_the_first_episode(terminal: MakeTerminal) -> None:
     output = terminal(columns=60)
     bar = make_progress(kp.preset("reference", episodes=9))
     bar.on_phase("evaluating")
@@ -185,9 +184,7 @@ def test_end_ends_the_line_once_also_before_the_first_episode(
     assert output.text().count("\n") == 1
 
 
-def test_narrow_terminal_leaves_out_the_least_important_figures(
-    terminal: Callable[..., Terminal],
-) -> None:
+def test_narrow_terminal_leaves_out_the_least_important_figures(terminal: MakeTerminal) -> None:
     shown = []
     for columns in (80, 70, 60, 50, 40):
         output = terminal(columns)
@@ -215,7 +212,7 @@ def drawn(output: Terminal) -> str:
     return output.text()
 
 
-def test_bar_needs_no_escape_codes(terminal: Callable[..., Terminal]) -> None:
+def test_bar_needs_no_escape_codes(terminal: MakeTerminal) -> None:
     longer, shorter = drawn(terminal(columns=60)).split("\r")[1:]
     assert (longer + shorter).isprintable()
     assert len(longer) == len(shorter) == 59  # nothing of the longer line is left
@@ -224,7 +221,7 @@ def test_bar_needs_no_escape_codes(terminal: Callable[..., Terminal]) -> None:
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp437", "ascii"])
 def test_bar_has_other_marks_where_the_code_page_lacks_them(
-    encoding: str, terminal: Callable[..., Terminal]
+    encoding: str, terminal: MakeTerminal
 ) -> None:
     before, after = drawn(terminal(60, encoding)).split("\r")[1:]
     assert before.startswith("training 1/2 ##")
@@ -232,7 +229,7 @@ def test_bar_has_other_marks_where_the_code_page_lacks_them(
     assert re.fullmatch(r"#+", after.split()[2])
 
 
-def test_dumb_terminal_gets_a_line_for_each_episode(terminal: Callable[..., Terminal]) -> None:
+def test_dumb_terminal_gets_a_line_for_each_episode(terminal: MakeTerminal) -> None:
     assert drawn(terminal(term="dumb")) == "".join(
         f"{record(episode).line()}\n" for episode in range(2)
     )

@@ -51,17 +51,16 @@ def test_checkpoints_are_written_at_episodes_0_10_20_and_at_the_end(
     assert calls == [(result.network, count - 1) for count in saved[1:]]
 
 
-def full_disk(descriptor: int) -> None:
-    raise OSError(28, "No space left on device")
-
-
 def fill_disk_after(files: int, monkeypatch: pytest.MonkeyPatch) -> None:
     remaining = iter(range(2 * files))  # each file, and its folder
     fsync = os.fsync
-    monkeypatch.setattr(
-        "keras_pendulum.storage.atomic_write.os.fsync",
-        lambda file: full_disk(file) if next(remaining, None) is None else fsync(file),
-    )
+
+    def flush(descriptor: int) -> None:
+        if next(remaining, None) is None:
+            raise OSError(28, "No space left on device")
+        fsync(descriptor)
+
+    monkeypatch.setattr("keras_pendulum.storage.atomic_write.os.fsync", flush)
 
 
 def test_failed_checkpoint_ends_the_run_and_keeps_the_previous_checkpoint(
@@ -104,7 +103,7 @@ def test_run_of_another_environment_is_removed_only_after_the_first_new_checkpoi
         kp.train_dqn(cartpole, tmp_path)
     policy = (tmp_path / "pendulum_weight.h5").read_bytes()
     with monkeypatch.context() as patched:
-        patched.setattr("keras_pendulum.storage.atomic_write.os.fsync", full_disk)
+        fill_disk_after(0, patched)
         with pytest.raises(kp.UserError, match="cannot write"):
             kp.train_dqn(cartpole, tmp_path, overwrite=True)
     assert (tmp_path / "pendulum_weight.h5").read_bytes() == policy
