@@ -32,13 +32,13 @@ Change = Callable[[Path, str], None]  # changes the file of a layout
 Members = dict[str, bytes]  # of a zip file
 
 
-def network() -> Any:
-    """Returns a Sequential, which Keras 3 saves in three layouts."""
+def network(one: int, two: int) -> Any:
+    """Returns a Sequential with so many hidden units, which Keras 3 saves in three layouts."""
     model = keras.Sequential(
         [
             keras.Input((3,)),
-            keras.layers.Dense(16, "tanh", name="one"),
-            keras.layers.Dense(8, "tanh", name="two"),
+            keras.layers.Dense(one, "tanh", name="one"),
+            keras.layers.Dense(two, "tanh", name="two"),
             keras.layers.Dense(5, name="three"),
         ],
         name="sequential",
@@ -57,14 +57,14 @@ def write_sound(layout: str, folder: Path) -> Path:
 
 
 @functools.cache
-def _sound(layout: str) -> bytes:
+def _sound(layout: str, hidden_units: tuple[int, int] = (16, 8)) -> bytes:
     if layout == "this package":
-        dqn = kp.DQN((16, 8), 5)
-        return encode_weights(dqn)  # with a checksum no change would be read
+        return encode_weights(kp.DQN(hidden_units, 5))  # with a checksum no change would be read
+    model = network(*hidden_units)
     with tempfile.TemporaryDirectory() as folder:
         suffix = {"whole model": ".h5", "Keras 3": ".weights.h5", "keras": ".keras"}[layout]
         path = Path(folder, f"a{suffix}")
-        (network().save_weights if layout == "Keras 3" else network().save)(path)
+        (model.save_weights if layout == "Keras 3" else model.save)(path)
         return path.read_bytes()
 
 
@@ -312,31 +312,21 @@ BY_BYTES: dict[str, Change] = {
 
 def one_layer_3000_times(path: Path, layout: str) -> None:
     """Writes a chain that repeats one layer of 1 MB."""
-    big = kp.DQN((512, 512), 5)
-    if layout == "this package":
-        kp.save_weights(big, path)
-        with h5py.File(path, "r+") as file:
-            names = [b"dense", *[b"dense_1"] * 3000, b"dense_2"]
-            file.attrs["layer_names"] = np.array(names)
-    else:
-        model = keras.Sequential(
-            [keras.Input((3,)), *map(keras.layers.Dense, (512, 512, 5))], name="sequential"
-        )
-        saved = path if layout == "whole model" else path.with_suffix(".weights.h5")
-        (model.save if layout == "whole model" else model.save_weights)(saved)
-        saved.rename(path)
-        with h5py.File(path, "r+", libver="latest") as file:
-            if layout == "whole model":
-                config = json.loads(file.attrs["model_config"])
-                layers = config["config"]["layers"]
-                layers[2:3] *= 3000
-                names = [layer["config"]["name"] for layer in layers[1:]]
-                file.attrs["model_config"] = json.dumps(config)
-                file["model_weights"].attrs["layer_names"] = np.array(names, "S")
-            else:
-                file.move("layers/dense_2", "layers/dense_3002")
-                for i in range(2, 3002):
-                    file[f"layers/dense_{i}"] = file["layers/dense_1"]
+    path.write_bytes(_sound(layout, (512, 512)))
+    with h5py.File(path, "r+", libver="latest") as file:
+        if layout == "this package":
+            names = ["dense", *["dense_1"] * 3000, "dense_2"]
+            file.attrs["layer_names"] = np.array(names, "S")
+        elif layout == "whole model":
+            config = json.loads(file.attrs["model_config"])
+            repeat_layer(config)
+            names = [layer["config"]["name"] for layer in config["config"]["layers"][1:]]
+            file.attrs["model_config"] = json.dumps(config)
+            file["model_weights"].attrs["layer_names"] = np.array(names, "S")
+        else:
+            file.move("layers/dense_2", "layers/dense_3002")
+            for i in range(2, 3002):
+                file[f"layers/dense_{i}"] = file["layers/dense_1"]
 
 
 def config_is(text: bytes) -> Change:
