@@ -41,9 +41,7 @@ class CheckpointWriter:
     """
 
     def __init__(
-        self,
-        path: str | os.PathLike[str],
-        require_not_moved: Callable[[], None] = lambda: None,
+        self, path: str | os.PathLike[str], require_not_moved: Callable[[], None] = lambda: None
     ) -> None:
         self.path = path
         self._require_not_moved = require_not_moved

@@ -16,11 +16,7 @@ import keras_pendulum as kp
 from keras_pendulum.dqn.agent import Agent
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage.recorded_run import load_recorded_run
-from keras_pendulum.train.checkpoint import (
-    CheckpointWriter,
-    load_checkpoint,
-    save_checkpoint,
-)
+from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 from keras_pendulum.train.loop import train_episodes
 from keras_pendulum.train.run import make_run
 

@@ -186,10 +186,7 @@ def test_initial_network_replaces_the_seeded_weights() -> None:
     [
         (kp.DQN((8,)), "has hidden_units (8,), the settings say (512, 256, 128)"),
         (kp.DQN((512, 256, 128), 5), "has action_count 5, the settings say 41"),
-        (
-            kp.DQN((512, 256, 128), activation="relu"),
-            "has activation relu, the settings say tanh",
-        ),
+        (kp.DQN((512, 256, 128), activation="relu"), "has activation relu, the settings say tanh"),
         (
             kp.DQN((8,), 2, observation_size=4, metadata={"environment": "CartPole-v1"}),
             "has environment CartPole-v1, the settings say Pendulum-v1",

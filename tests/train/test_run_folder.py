@@ -18,11 +18,7 @@ from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.storage import run_folder
 from keras_pendulum.storage.atomic_write import write_atomically
 from keras_pendulum.storage.run_folder import RunFolder, find_run
-from keras_pendulum.train.checkpoint import (
-    CheckpointWriter,
-    load_checkpoint,
-    save_checkpoint,
-)
+from keras_pendulum.train.checkpoint import CheckpointWriter, load_checkpoint, save_checkpoint
 
 pytestmark = pytest.mark.usefixtures("short_ending")
 CONFIG = kp.preset("original", episodes=2, **SHORT)
