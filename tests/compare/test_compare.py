@@ -12,7 +12,6 @@ from conftest import Refusal
 import keras_pendulum as kp
 from keras_pendulum.compare import __main__ as compare
 from keras_pendulum.compare.runs import short_names
-from keras_pendulum.errors import UserError
 
 
 def make_run(path: Path, preset: str, **settings: object) -> None:
@@ -84,11 +83,14 @@ def test_runs_of_other_tasks_are_refused_by_name(runs: Path, refusal: Refusal) -
 
 
 def test_wrong_folders_and_files_are_one_error_line(runs: Path, refusal: Refusal) -> None:
-    one = str(runs / "one")
+    one, two = str(runs / "one"), str(runs / "two")
     for words, message in (
         ([], "the following arguments are required: RUN_FOLDER"),
         ([""], "the name is empty"),
         (["missing"], "missing: no such folder"),
+        (["."], ".: holds no run (no pendulum_weight.h5 or cartpole_weight.h5)"),
+        ([one, one], f"{one} and {one} are the same folder: name it once"),
+        ([one, two, f"{one}/../one"], f"{one} and {one}/../one are the same folder"),
         (["text.h5"], "text.h5: a file; expected the folder of a run"),
         ([one, "--out", "text.h5"], "text.h5 holds something else than a PNG"),
         ([one, "--out", "a.jpg"], "--out is a.jpg: expected a name that ends in .png"),
@@ -98,39 +100,11 @@ def test_wrong_folders_and_files_are_one_error_line(runs: Path, refusal: Refusal
         assert message in refusal(compare.main, words)
 
 
-@pytest.fixture
-def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Empty files with the names of checkpoints; the process is in their folder."""
-    for name in ("a/pendulum_weight.h5", "b/pendulum_weight.h5", "c/a/cartpole_weight.h5"):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).touch()
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def test_checkpoint_of_each_folder_is_found(folders: Path) -> None:
-    found = [run.weights for run in compare._find_runs(["b", "c/a/", str(folders / "a")])]
-    names = ["b/pendulum_weight.h5", "c/a/cartpole_weight.h5", "a/pendulum_weight.h5"]
-    assert found == [(folders / name).resolve() for name in names]
-
-
-@pytest.mark.parametrize(
-    ("names", "message"),
-    [
-        (["a", "a"], "a and a are the same folder: name it once"),
-        (["a", "b", "./a"], r"a and \./a are the same folder"),
-        (["c"], r"c: holds no run \(no pendulum_weight.h5 or cartpole_weight.h5\)"),
-    ],
-)
-def test_folder_without_a_run_of_its_own_is_refused(
-    names: list[str], message: str, folders: Path
+def test_names_have_as_many_parents_as_make_them_different(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(UserError, match=message):
-        compare._find_runs(names)
-
-
-def test_names_have_as_many_parents_as_make_them_different(folders: Path) -> None:
+    monkeypatch.chdir(tmp_path)
     assert short_names(["a", "b"]) == ["a", "b"]
-    assert short_names(["a", "c/a"]) == [f"{folders.name}/a", "c/a"]
+    assert short_names(["a", "c/a"]) == [f"{tmp_path.name}/a", "c/a"]
     assert short_names(["c/a/."]) == ["a"]
     assert short_names(["/", "a"]) == ["/", "a"]
