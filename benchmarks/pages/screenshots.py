@@ -38,11 +38,10 @@ def draw_game() -> None:
     import keras_pendulum as kp
     from keras_pendulum.environments.pendulum import Pendulum
     from keras_pendulum.play.game import Game, Key
-    from keras_pendulum.play.played_task import played_task
     from keras_pendulum.play.window import Window
 
     window = Window(wait_for_frame=lambda: None)
-    game = Game(played_task(Pendulum()), 5, kp.load_policy("reference"), print_line=lambda _: None)
+    game = Game(Pendulum(), 5, kp.load_policy("reference"), print_line=lambda _: None)
     game.press(Key.POSITIVE)
     for _ in range(200 + 21):
         game.advance()

@@ -22,7 +22,6 @@ from keras_pendulum.config.settings import validate_setting
 from keras_pendulum.display import require_display
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import declared_task
-from keras_pendulum.play.control_c import control_c
 from keras_pendulum.storage.find_weights import find_weights
 from keras_pendulum.storage.shipped_weights import shipped_names
 from keras_pendulum.tensorflow_setup import fast_import
@@ -70,13 +69,13 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
 
 
 def _play(arguments: argparse.Namespace) -> int:
-    environment, gravity, seed = arguments.environment, arguments.gravity, arguments.seed
-    task = declared_task(environment or "Pendulum-v1").with_gravity(gravity)
+    task = declared_task(arguments.environment or "Pendulum-v1").with_gravity(arguments.gravity)
+    seed = arguments.seed
     if seed is not None:
         seed = validate_setting("seed", seed)
     file = find_weights(arguments.against) if arguments.against is not None else None
     require_display()
-    from keras_pendulum.play.window import Window
+    from keras_pendulum.play.window import Window, control_c
 
     with control_c() as check_control_c:
         window = Window()
@@ -84,31 +83,25 @@ def _play(arguments: argparse.Namespace) -> int:
             policy = None
             if file is not None:
                 window.show_loading(f"Loading the policy of {file.name} …")
-                policy = _load_policy(file, arguments.activation)
-                if environment:
-                    policy = policy.with_environment(environment)
-                task = _task_of(policy, gravity)
+                policy, task = _load_policy(file, arguments)
             return _run_game(window, check_control_c, task, seed, policy, arguments.print_steps)
         finally:
             window.close()
 
 
-def _load_policy(file: Path, activation: str | None) -> Policy:
-    """Returns the greedy policy of a weights file."""
+def _load_policy(file: Path, arguments: argparse.Namespace) -> tuple[Policy, Task]:
+    """Returns a policy and its task, and prints a line where its gravity had to be found."""
     with fast_import():
+        from keras_pendulum.evaluate.evaluation import find_task
         from keras_pendulum.evaluate.sources import load_policy
 
-    return load_policy(file, activation)
-
-
-def _task_of(policy: Policy, gravity: float | None) -> Task:
-    """Returns the task of a policy, and prints a line where its gravity had to be found."""
-    from keras_pendulum.evaluate.evaluation import find_task
-
-    task, assumption = find_task(policy, gravity)
-    if assumption and gravity is None:
+    policy = load_policy(file, arguments.activation)
+    if arguments.environment:
+        policy = policy.with_environment(arguments.environment)
+    task, assumption = find_task(policy, arguments.gravity)
+    if assumption and arguments.gravity is None:
         print(assumption)
-    return task
+    return policy, task
 
 
 def _run_game(
@@ -121,7 +114,6 @@ def _run_game(
 ) -> int:
     from keras_pendulum.optimum.solution import USUAL_SEEDS
     from keras_pendulum.play.game import Game
-    from keras_pendulum.play.played_task import played_task
     from keras_pendulum.play.window import play
 
     if seed is None:
@@ -129,7 +121,7 @@ def _run_game(
         seed = random.choice(USUAL_SEEDS)
     window.show_loading(f"Loading the best possible returns of {task.name} …")
     print_line = functools.partial(print, flush=True)
-    game = Game(played_task(task), seed, policy, print_line=print_line, print_steps=print_steps)
+    game = Game(task, seed, policy, print_line=print_line, print_steps=print_steps)
     try:
         play(game, window, check_control_c)
     finally:

@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import Enum, auto
 
+from keras_pendulum.environments.task import Task
 from keras_pendulum.evaluate.policy import Policy
 from keras_pendulum.figures.moment import ShownEpisode, States
+from keras_pendulum.figures.scenes import scene
 from keras_pendulum.optimum.solution import USUAL_SEEDS
 from keras_pendulum.optimum.solutions import solution
-from keras_pendulum.play.played_task import PlayedTask
+from keras_pendulum.play.controls import CONTROLS
 
 FRAMES_PER_SECOND = 20  # each is a step: of 0.05 s for the pendulum
 READY_FRAMES = 2 * FRAMES_PER_SECOND  # the player sees the start before anything moves
@@ -63,14 +65,15 @@ class Game:
     The constructor takes some 20 s if the optimal return of the first start is not stored yet.
 
     Args:
-        task: as the game plays it.
+        task: Pendulum-v1 or CartPole-v1.
         seed: of the first start.
         policy: drives after the player, if there is one.
         print_line: called with each line of output.
         print_steps: print a line for each step of the player.
 
     Attributes:
-        task: as the game plays it.
+        task: that is played.
+        controls: what its keys do.
         seed: of the present start.
         episode: on the screen.
         held: whether a key acts only while it is held.
@@ -79,7 +82,7 @@ class Game:
 
     def __init__(
         self,
-        task: PlayedTask,
+        task: Task,
         seed: int,
         policy: Policy | None = None,
         *,
@@ -88,10 +91,11 @@ class Game:
     ) -> None:
         self.task, self._policy, self._print_line = task, policy, print_line
         self._print_steps = print_steps
-        right = task.scene.dynamics.rightward
+        self.controls, self._scene = CONTROLS[task.environment], scene(task)
+        right = self._scene.dynamics.rightward
         self._directions = {Key.NEGATIVE: -1, Key.POSITIVE: 1, Key.NEUTRAL: 0}
         self._directions |= {Key.LEFT: -right, Key.RIGHT: right}
-        self._env = task.task.make_env()
+        self._env = task.make_env()
         self.finished = self.held = False
         self._stage = _Stage.READY
         self._start(seed)
@@ -160,8 +164,8 @@ class Game:
 
     def _start(self, seed: int) -> None:
         self.seed = seed
-        self._optimal_return = float(solution(self.task.task).best_returns([seed])[0])
-        self._print_line(f"Start: seed {seed}, {self.task.task.name}")
+        self._optimal_return = float(solution(self.task).best_returns([seed])[0])
+        self._print_line(f"Start: seed {seed}, {self.task.name}")
         self._restart()
 
     def _restart(self) -> None:
@@ -173,14 +177,14 @@ class Game:
 
     def _new_episode(self) -> ShownEpisode:
         observation, _ = self._env.reset(seed=self.seed)
-        return ShownEpisode(self.task.scene, self._env, observation, self._optimal_return)
+        return ShownEpisode(self._scene, self._env, observation, self._optimal_return)
 
     def _step_player(self) -> None:
-        player, scene = self._player, self.task.scene
-        player.step(self.task.action(self._direction, player.steps))
+        player, effort = self._player, self._scene.dynamics.effort
+        player.step(self.controls.action(self._direction, player.steps))
         if self._print_steps:
             self._print_line(
-                f"Step: {player.steps}, {scene.dynamics.effort.capitalize()}: {player.effort:g}, "
+                f"Step: {player.steps}, {effort.capitalize()}: {player.effort:g}, "
                 f"Reward: {player.reward:.3f}, Return: {player.total_reward:.3f}"
             )
         if player.done:
@@ -208,10 +212,10 @@ class Game:
 
     def _score(self) -> str:
         """Returns the returns of the finished episodes, or the player's return so far."""
-        show = self.task.scene.show_return
+        show = self._scene.show_return
         player = f"you {show(self._player.total_reward)}"
         if not self._player.done:
-            steps = self.task.task.steps_per_episode
+            steps = self.task.steps_per_episode
             return f"{player} after {self._player.steps} of {steps} steps"
         parts = [player]
         if self.episode is not self._player and self.episode.done:

@@ -1,9 +1,11 @@
-"""The window of the game: it reads keys and draws frames."""
+"""The window of the game: it reads keys, and Ctrl-C, and draws frames."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pygame
 
@@ -86,12 +88,13 @@ class Window:
         self._write(game.title, (16, 13), LARGE)
         acts = "while it is held" if game.held else "until the next one"
         self._write(f"a key acts {acts} (h: switch)", (_WIDTH // 2 - 90, 16), align=0.5)
-        start = f"{game.task.setting}      start of seed {game.seed}"
+        setting = game.controls.setting.format(gravity=game.task.gravity)
+        start = f"{setting}      start of seed {game.seed}"
         self._write(start, (_WIDTH - 16, 16), align=1.0)
         draw_moment(self._writer, _MOMENT, game.episode, game.earlier_path)
         if game.message:
             self._write(game.message, (_WIDTH // 4, _TOP + 6), align=0.5)
-        self._write(game.task.keys, (16, _HEIGHT - 30))
+        self._write(game.controls.keys, (16, _HEIGHT - 30))
         self._write(game.key_help, (_WIDTH - 16, _HEIGHT - 30), align=1.0)
         pygame.display.flip()
         self._wait_for_frame()
@@ -110,3 +113,30 @@ def play(game: Game, window: Window, check_interrupt: Callable[[], None]) -> Non
                 return
         game.advance()
         window.show(game)
+
+
+@contextmanager
+def control_c() -> Iterator[Callable[[], None]]:
+    """Yields a function that raises KeyboardInterrupt if Ctrl-C was pressed in the `with` block.
+
+    Ctrl-C raises it at once, too, but the C code of pygame may drop the exception.
+    """
+    pressed = False
+
+    def check() -> None:
+        if pressed:
+            raise KeyboardInterrupt
+
+    def on_signal(number: int, frame: object) -> None:
+        nonlocal pressed
+        pressed = True
+        check()
+
+    before = signal.getsignal(signal.SIGINT)
+    # A process that ignores Ctrl-C, or has its own handler, stays as it is.
+    if before is signal.default_int_handler:
+        signal.signal(signal.SIGINT, on_signal)
+    try:
+        yield check
+    finally:
+        signal.signal(signal.SIGINT, before)

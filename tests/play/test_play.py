@@ -19,6 +19,7 @@ import pygame
 import pytest
 from conftest import Command, Refusal, command_line, wait_for
 from drawn_texts import record_texts, require_legible_texts
+from numpy.typing import NDArray
 
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
@@ -33,10 +34,9 @@ from keras_pendulum.figures.moment import draw_portrait
 from keras_pendulum.figures.scenes import scene
 from keras_pendulum.figures.style import CLOCKWISE, COUNTERCLOCKWISE, rgb
 from keras_pendulum.play import __main__ as play_command
-from keras_pendulum.play.control_c import control_c
+from keras_pendulum.play.controls import CONTROLS
 from keras_pendulum.play.game import READY_FRAMES, Game, Key
-from keras_pendulum.play.played_task import PLAYED_TASKS, played_task
-from keras_pendulum.play.window import Window, play
+from keras_pendulum.play.window import Window, control_c, play
 
 NO_DISPLAY = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
 CLOSED = "error: the window was closed before the end of the last episode\n"
@@ -95,7 +95,7 @@ def play_game(keys: Mapping[int, Any], **settings: Any) -> Player:
     player = Player(keys)
     settings = {"seed": 3, "print_steps": True} | settings
     task = settings.pop("task", None) or Pendulum(settings.pop("gravity", 1.0))
-    game = Game(played_task(task), **settings, print_line=player.lines.append)
+    game = Game(task, **settings, print_line=player.lines.append)
     play(game, Window(player.end_frame), lambda: None)
     game.close()
     return player
@@ -120,7 +120,7 @@ def test_key_starts_and_its_torque_acts_until_the_next_key(
 
 
 def test_every_task_is_played() -> None:
-    assert PLAYED_TASKS.keys() == TASKS.keys()
+    assert CONTROLS.keys() == TASKS.keys()
 
 
 @pytest.mark.parametrize(("key", "force"), [("j", -10), ("RIGHT", 10)])
@@ -159,14 +159,6 @@ def test_held_key_acts_until_it_is_released(task: Any, no_window: None) -> None:
 def test_released_key_acts_on_without_the_switch(no_window: None) -> None:
     keys = {1: pygame.K_l, 3: -pygame.K_l, 5: [pygame.K_h, pygame.K_h], 7: pygame.K_ESCAPE}
     assert play_game(keys).torques == [2] * 4 + [0] * 2
-
-
-@pytest.mark.parametrize(("angle", "side"), [(-0.2, "left"), (0.2, "right")])
-def test_pole_leans_to_the_side_of_its_angle(angle: float, side: str) -> None:
-    state = np.array([0, 0, angle, 0], np.float32)
-    pixels = pygame.surfarray.array3d(scene(CartPole()).draw(state, 0.0, (500, 456)))
-    pole = (abs(pixels.astype(int) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
-    assert (pole[:250].sum() > 3 * pole[250:].sum()) == (side == "left")
 
 
 def test_game_starts_without_a_key_and_without_torque(no_window: None) -> None:
@@ -283,22 +275,30 @@ def test_path_does_not_cross_the_portrait_where_the_angle_jumps() -> None:
     assert (portrait([(3.1, 2.0)]) == portrait([(-3.1, 2.0), (3.1, 2.0)])).all()
 
 
-def drawn_pendulum(angle: float, torque: float) -> Any:
-    """Returns the pixels [500, 456, 3] of the pendulum at an angle."""
-    observation = np.array([np.cos(angle), np.sin(angle), 0], np.float32)
-    return pygame.surfarray.array3d(scene(Pendulum()).draw(observation, torque, (500, 456)))
+def drawn(task: Any, observation: list[float], effort: float) -> NDArray[np.int_]:
+    """Returns the pixels [500, 456, 3] of a task."""
+    picture = scene(task).draw(np.array(observation, np.float32), effort, (500, 456))
+    return pygame.surfarray.array3d(picture).astype(int)
 
 
-@pytest.mark.parametrize(("angle", "side"), [(0.5 * np.pi, "left"), (-0.5 * np.pi, "right")])
-def test_pendulum_is_drawn_counterclockwise_from_upright(angle: float, side: str) -> None:
-    pixels = drawn_pendulum(angle, 0.0)
-    rod = (abs(pixels.astype(int) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
+@pytest.mark.parametrize(
+    ("task", "observation", "side"),
+    [
+        (CartPole(), [0, 0, -0.2, 0], "left"),
+        (CartPole(), [0, 0, 0.2, 0], "right"),
+        (Pendulum(), [0, 1, 0], "left"),  # π/2, counter-clockwise from upright
+        (Pendulum(), [0, -1, 0], "right"),
+    ],
+    ids=str,
+)
+def test_rod_leans_to_the_side_of_its_angle(task: Any, observation: list[float], side: str) -> None:
+    rod = (abs(drawn(task, observation, 0.0) - drawing.ROD).sum(axis=2) < 30).sum(axis=1)
     assert (rod[:250].sum() > 3 * rod[250:].sum()) == (side == "left")
 
 
 def test_arrow_of_the_torque_has_a_white_border_on_the_rod() -> None:
-    pixels = drawn_pendulum(np.pi, 2.0).astype(int)
-    below = pixels[250, 228 + 20 :]  # from the pivot down, along the hanging rod
+    hanging = drawn(Pendulum(), [-1, 0, 0], 2.0)
+    below = hanging[250, 228 + 20 :]  # from the pivot down, along the rod
     colors = {"rod": drawing.ROD, "arrow": rgb(COUNTERCLOCKWISE), "border": drawing.WHITE}
     crossed: list[str] = []
     for pixel in below[:150]:
@@ -318,7 +318,7 @@ def test_window_says_that_it_loads_before_the_policy_is_loaded(
         shown.append(text)
         write(self, text, *options, **named)
 
-    def load(file: Path, activation: str | None) -> Any:
+    def load(*_: object) -> None:
         assert shown == ["Loading the policy of reference.h5 …"]
         screen = pygame.display.get_surface()
         assert screen is not None
@@ -379,6 +379,19 @@ def test_leaving_while_the_agent_drives_prints_the_score_of_the_player(
     assert player.scores == [f"you {you:.1f} · best possible {optimum:.1f}"]
 
 
+@pytest.fixture
+def played(no_window: None, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The task, seed, policy and flag of each game that the command would play."""
+    games: list[Any] = []
+
+    def record(window: Window, check_control_c: object, *game: Any) -> int:
+        games.append(game)
+        return 0
+
+    monkeypatch.setattr(play_command, "_run_game", record)
+    return games
+
+
 @pytest.mark.parametrize(
     ("words", "gravity"),
     [
@@ -393,34 +406,17 @@ def test_leaving_while_the_agent_drives_prints_the_score_of_the_player(
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_gravity_is_the_flag_or_the_recorded_one_or_1(
-    words: list[str], gravity: float | None, no_window: None, monkeypatch: pytest.MonkeyPatch
+    words: list[str], gravity: float | None, played: list[Any]
 ) -> None:
-    played: list[Any] = []
-
-    def record(window: Window, control_c: object, task: Any, *settings: Any) -> int:
-        played.extend([task, *settings])
-        return 0
-
-    monkeypatch.setattr(play_command, "_run_game", record)
     assert play_command.main([*words, "--seed", "7"]) == 0
-    task, seed, policy, _ = played
+    ((task, seed, policy, _),) = played
     expected = CartPole() if gravity is None else Pendulum(gravity)
     assert (task, seed, policy is not None) == (expected, 7, "--against" in words)
 
 
 def test_policy_without_a_recorded_gravity_plays_where_it_is_better(
-    tmp_path: Path,
-    no_window: None,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, played: list[Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    played: list[Any] = []
-
-    def record(window: Window, control_c: object, task: Any, *settings: Any) -> int:
-        played.append(task)
-        return 0
-
-    monkeypatch.setattr(play_command, "_run_game", record)
     shipped = kp.load_weights("swingup")
     network = kp.DQN(shipped.hidden_units, shipped.action_count, activation=shipped.activation)
     network.set_weights(shipped.get_weights())
@@ -429,7 +425,7 @@ def test_policy_without_a_recorded_gravity_plays_where_it_is_better(
     assert "records no gravity" in capsys.readouterr().out
     assert play_command.main(["--against", str(tmp_path / "mine.h5"), "--gravity", "3"]) == 0
     assert "records no gravity" not in capsys.readouterr().out
-    assert played == [Pendulum(10.0), Pendulum(3.0)]
+    assert [task for task, *_ in played] == [Pendulum(10.0), Pendulum(3.0)]
 
 
 # Plays in a window that is closed at once.
@@ -612,7 +608,7 @@ def test_control_c_that_pygame_drops_ends_play_at_the_next_frame() -> None:
                     signal.raise_signal(signal.SIGINT)
 
     window: Any = DroppingWindow()
-    game = Game(played_task(Pendulum()), 5)
+    game = Game(Pendulum(), 5)
     before = signal.getsignal(signal.SIGINT)
     # The test runner may have been started with Ctrl-C ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
