@@ -162,18 +162,15 @@ def run_command(command: Callable[[], int]) -> int:
         sys.stdout.flush()
         return status
     except UserError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        problem = str(error)
     except _ParserExit:
         raise
     except SystemExit as error:
-        print(f"error: the agent's code exits (SystemExit: {error.code})", file=sys.stderr)
-        return 2
+        problem = f"the agent's code exits (SystemExit: {error.code})"
     except KeyboardInterrupt:
         return 130
     except MemoryError:
-        print("error: the memory is not large enough for this", file=sys.stderr)
-        return 2
+        problem = "the memory is not large enough for this"
     except OSError as error:
         # The reader of the output has exited, or the disk is full. Without this, Python prints a
         # second error when it flushes.
@@ -183,8 +180,9 @@ def run_command(command: Callable[[], int]) -> int:
             return 1
         if sys.platform == "win32" and error.errno == errno.EINVAL:  # a pipe without a reader
             return 1
-        print(f"error: {one_line(str(error))}", file=sys.stderr)
-        return 2
+        problem = one_line(str(error))
+    print(f"error: {problem}", file=sys.stderr)
+    return 2
 
 
 @contextlib.contextmanager
@@ -215,10 +213,8 @@ def print_json(value: dict[str, Any]) -> None:
 def _prepare_output() -> None:
     """Lets `print` succeed where the output is closed or cannot encode a character."""
     # A stream that the parent process has closed is None. `print` would take None for stdout.
-    if sys.stdout is None:
-        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors != "replace":
         sys.stdout.reconfigure(errors="replace")
 

@@ -2,9 +2,8 @@
 
 The scripts and the texts of a task are in a folder of their own in `web/`.
 
-The weights are base85 of float32, so the page needs no server and no network connection. The comma
-replaces the character <, which a script cannot contain. The optimal values are 16-bit numbers:
-their differences, compressed, in base64.
+The weights are base64 of float32, so the page needs no server and no network connection. The
+optimal values are 16-bit numbers: their differences, compressed, in base64.
 """
 
 from __future__ import annotations
@@ -95,7 +94,7 @@ def _network_content(network: DQN, path: Path, task: Task) -> dict[str, Any]:
         "activation": network.activation,
         "discount": info.discount,
         "rewardScale": info.reward_scale,
-        "weights": base64.b85encode(weights).decode().replace("<", ","),
+        "weights": base64.b64encode(weights).decode(),
     }
 
 

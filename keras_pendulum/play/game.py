@@ -36,24 +36,12 @@ class Key(Enum):
 
 
 class _Stage(Enum):
-    READY = auto()  # the window shows the start
-    PLAYER = auto()
-    AGENT = auto()
-    SCORE = auto()
+    """A stage of the game, with its title in the window and the keys that the window names."""
 
-
-_TITLES = {
-    _Stage.READY: "You drive",
-    _Stage.PLAYER: "You drive",
-    _Stage.AGENT: "The agent drives",
-    _Stage.SCORE: "The score",
-}
-_KEY_HELP = {
-    _Stage.READY: "Press j, k, l or Enter to start, or wait 2 seconds",
-    _Stage.PLAYER: "r  same start again     ESC  leave",
-    _Stage.AGENT: "Enter  skip to the score     r  drive again     ESC  leave",
-    _Stage.SCORE: "r  same start again     Enter  next start     ESC  leave",
-}
+    READY = "You drive", "Press j, k, l or Enter to start, or wait 2 seconds"
+    PLAYER = "You drive", "r  same start again     ESC  leave"
+    AGENT = "The agent drives", "Enter  skip to the score     r  drive again     ESC  leave"
+    SCORE = "The score", "r  same start again     Enter  next start     ESC  leave"
 
 
 class Game:
@@ -141,7 +129,7 @@ class Game:
     @property
     def title(self) -> str:
         """Who drives."""
-        return _TITLES[self._stage]
+        return self._stage.value[0]
 
     @property
     def message(self) -> str:
@@ -151,7 +139,7 @@ class Game:
     @property
     def key_help(self) -> str:
         """The keys of the present stage."""
-        return _KEY_HELP[self._stage]
+        return self._stage.value[1]
 
     @property
     def earlier_path(self) -> States:

@@ -16,27 +16,6 @@ import keras_pendulum as kp
 LONG = "n" * 250
 
 
-@pytest.mark.parametrize(
-    ("command", "words", "expected"),
-    [
-        ("evaluate", ("reference", "--torques", "-2,2"), "needs --torques=VALUE"),
-        ("evaluate", ("",), "the name of the weights file is empty"),
-        ("evaluate", (LONG,), "no such file"),
-        ("page", ("reference", "--out", f"{LONG * 2}.html"), "File name too long"),
-        ("evaluate", ("reference", "--gif", "no/a.gif"), "there is no folder no"),
-        ("page", ("reference", "--out", "no/a.html"), "there is no folder no"),
-        ("study", ("--arm", "A: reference tau=0.1 tau=0.2"), "the arm 'A' sets tau twice"),
-    ],
-)
-def test_error_says_what_to_do(
-    command: str, words: tuple[str, ...], expected: str, in_process: Command
-) -> None:
-    result = in_process(command, *words)
-    assert (result.returncode, result.stdout) == (2, "")
-    assert expected in result.stderr
-    assert len(result.stderr.splitlines()) == 1
-
-
 def test_empty_names_are_refused_in_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     network = kp.load_weights("reference")

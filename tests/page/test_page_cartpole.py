@@ -85,7 +85,7 @@ def test_optimum_is_the_exact_one_and_pale_where_all_is_lost(cartpole: Player) -
     states = random.uniform(-1, 1, (300, 4)) * [2.4, 3, LARGEST_ANGLE, 3]
     found = cartpole.run(
         "const o = pendulum.page.optimum, t = pendulum.page.task;"
-        "return arguments[0].map(s => [...t.efforts().map(e => o.qValue(s, e)), o.effort(s)])",
+        "return arguments[0].map(s => [...o.qValues(s, t.efforts()), o.effort(s)])",
         states.tolist(),
     )
     found = np.array(found)

@@ -65,7 +65,8 @@ WRONG = [
     ([RECORDED, "--gravity", "heavy"], "invalid float value: 'heavy'"),
     ([RECORDED, "--out", ""], "the name is empty"),
     ([RECORDED, "--out", "text.h5"], "text.h5 holds something else than a page of this command"),
-    ([RECORDED, "--out", "no/such/folder.html"], "cannot write no/such/folder.html"),
+    ([RECORDED, "--out", "no/a.html"], "cannot write no/a.html: there is no folder no"),
+    ([RECORDED, "--out", f"{'n' * 500}.html"], "File name too long"),
     ([RECORDED, "--open"], "there is no display for a browser: leave out --open"),
 ]
 

@@ -161,8 +161,8 @@ def test_map_shows_the_greedy_torque_of_every_state(files: dict[str, Path], user
 def test_clockwise_torques_are_hatched(user: Player) -> None:
     colours = user.run(
         "const count = (torque) => {"
-        "  const map = {size: 97, efforts: new Float32Array(97 * 97).fill(torque)};"
-        "  const picture = mapPicture(map, pendulum.page.view.colours, 200, 100);"
+        "  const efforts = new Float32Array(97 * 97).fill(torque);"
+        "  const picture = mapPicture(efforts, pendulum.page.view.colours, 200, 100);"
         "  const {data} = picture.getContext('2d').getImageData(0, 0, 200, 100);"
         "  return new Set(new Uint32Array(data.buffer)).size;"
         "};"

@@ -35,6 +35,13 @@ def open_lesson(player: Player, address: str, words: str = SMALL) -> None:
     wait_for(lambda: player.run("return Boolean(pendulum.lesson?.exact)"))
 
 
+@pytest.fixture
+def learner(pages: dict[str, str], player: Player) -> Player:
+    """A player on a page whose lesson is one small healthy run."""
+    open_lesson(player, pages["one"])
+    return player
+
+
 def step(player: Player, episodes: int) -> None:
     """Trains for some episodes by the button, one by one."""
     for _ in range(episodes):
@@ -135,19 +142,18 @@ def test_address_sets_the_lesson(pages: dict[str, str], player: Player) -> None:
     assert player.run("return pendulum.lesson.runs.length") == 1
 
 
-def test_choices_are_written_into_the_address(pages: dict[str, str], player: Player) -> None:
-    open_lesson(player, pages["one"])
+def test_choices_are_written_into_the_address(learner: Player) -> None:
     for name in SWITCHES:
-        assert player.driver.find_element(By.CSS_SELECTOR, f'#faults [value="{name}"]')
-    player.driver.find_element(By.CSS_SELECTOR, '#faults [value="short-sight"]').click()
-    player.find("another-seed").click()
-    assert player.run("return location.hash") == "#learn&fault=short-sight&seed=4&network=8"
-    assert player.text("fault-text") == SWITCHES["short-sight"].sentence
-    player.run("location.hash = '#fault=far-sight&network=9-9&speed=3'")
-    wait_for(lambda: player.text("fault-text") == SWITCHES["far-sight"].sentence)
-    assert player.run("return pendulum.lesson.runs[1].settings.discount") == 0.999
-    assert player.find("network-size").get_property("value") == "9-9"
-    assert player.find("speed").get_property("value") == "3"
+        assert learner.driver.find_element(By.CSS_SELECTOR, f'#faults [value="{name}"]')
+    learner.driver.find_element(By.CSS_SELECTOR, '#faults [value="short-sight"]').click()
+    learner.find("another-seed").click()
+    assert learner.run("return location.hash") == "#learn&fault=short-sight&seed=4&network=8"
+    assert learner.text("fault-text") == SWITCHES["short-sight"].sentence
+    learner.run("location.hash = '#fault=far-sight&network=9-9&speed=3'")
+    wait_for(lambda: learner.text("fault-text") == SWITCHES["far-sight"].sentence)
+    assert learner.run("return pendulum.lesson.runs[1].settings.discount") == 0.999
+    assert learner.find("network-size").get_property("value") == "9-9"
+    assert learner.find("speed").get_property("value") == "3"
 
 
 def test_healthy_and_faulty_run_start_alike_and_stay_side_by_side(
@@ -170,48 +176,41 @@ def test_healthy_and_faulty_run_start_alike_and_stay_side_by_side(
     assert one[45]["episodeReturn"] != other[45]["episodeReturn"]
 
 
-def test_switch_starts_both_runs_anew_while_they_learn(
-    pages: dict[str, str], player: Player
-) -> None:
-    open_lesson(player, pages["one"])
-    player.find("train").click()
-    wait_for(lambda: len(records(player)[0]) >= 5)
+def test_switch_starts_both_runs_anew_while_they_learn(learner: Player) -> None:
+    learner.find("train").click()
+    wait_for(lambda: len(records(learner)[0]) >= 5)
     for name in ("no-target", "one-update"):
-        player.driver.find_element(By.CSS_SELECTOR, f'#faults [value="{name}"]').click()
-        player.find("another-seed").click()
-    wait_for(lambda: [len(each) >= 5 for each in records(player)] == [True, True])
-    assert player.run("return pendulum.lesson.runs.map(r => r.settings.seed)") == [5, 5]
-    player.find("train").click()
-    wait_for(lambda: player.text("learning-status") == "Paused.")
+        learner.driver.find_element(By.CSS_SELECTOR, f'#faults [value="{name}"]').click()
+        learner.find("another-seed").click()
+    wait_for(lambda: [len(each) >= 5 for each in records(learner)] == [True, True])
+    assert learner.run("return pendulum.lesson.runs.map(r => r.settings.seed)") == [5, 5]
+    learner.find("train").click()
+    wait_for(lambda: learner.text("learning-status") == "Paused.")
 
 
-def test_screen_readers_are_told_only_the_changes_of_state(
-    pages: dict[str, str], player: Player
-) -> None:
-    open_lesson(player, pages["one"])
-    live = player.run(
+def test_screen_readers_are_told_only_the_changes_of_state(learner: Player) -> None:
+    live = learner.run(
         "return [...document.querySelectorAll('#learn :is(output, [role=status], [role=alert]),"
         " #learn [aria-live]')].map(e => e.id)"
     )
     assert live == ["learning-status"]
-    player.run(
+    learner.run(
         "window.told = []; new MutationObserver(() => told.push("
         "  element('learning-status').textContent)).observe(element('learning-status'),"
         "  {childList: true, characterData: true, subtree: true})"
     )
-    step(player, 1)
-    player.find("train").click()
-    wait_for(lambda: len(records(player)[0]) >= 30)
-    player.find("train").click()
-    wait_for(lambda: player.text("learning-status") == "Paused.")
-    assert player.run("return told") == ["Paused.", "Learning.", "Paused."]
+    step(learner, 1)
+    learner.find("train").click()
+    wait_for(lambda: len(records(learner)[0]) >= 30)
+    learner.find("train").click()
+    wait_for(lambda: learner.text("learning-status") == "Paused.")
+    assert learner.run("return told") == ["Paused.", "Learning.", "Paused."]
 
 
-def test_exact_values_are_those_of_the_package(pages: dict[str, str], player: Player) -> None:
-    open_lesson(player, pages["one"])
+def test_exact_values_are_those_of_the_package(learner: Player) -> None:
     states = np.random.RandomState(0).uniform([-np.pi, -6], [np.pi, 6], (200, 2))
     found = np.array(
-        player.run(
+        learner.run(
             "return arguments[0].map(s => pendulum.lesson.exact.of.value(s))", states.tolist()
         )
     )
@@ -225,19 +224,16 @@ def test_exact_values_are_those_of_the_package(pages: dict[str, str], player: Pl
     assert np.ptp(expected) > 50
 
 
-def test_sweeps_begin_at_zero_and_end_at_the_exact_values(
-    pages: dict[str, str], player: Player
-) -> None:
-    open_lesson(player, pages["one"])
-    solved = player.run("return pendulum.lesson.exact.sweeps")
-    player.find("sweep").click()
-    wait_for(lambda: player.run("return pendulum.lesson.swept.sweeps") < solved)
-    early = player.run("return Math.min(...pendulum.lesson.swept.values)")
-    exact = player.run("return Math.min(...pendulum.lesson.exact.values)")
+def test_sweeps_begin_at_zero_and_end_at_the_exact_values(learner: Player) -> None:
+    solved = learner.run("return pendulum.lesson.exact.sweeps")
+    learner.find("sweep").click()
+    wait_for(lambda: learner.run("return pendulum.lesson.swept.sweeps") < solved)
+    early = learner.run("return Math.min(...pendulum.lesson.swept.values)")
+    exact = learner.run("return Math.min(...pendulum.lesson.exact.values)")
     assert exact < early <= 0
-    wait_for(lambda: player.run("return pendulum.lesson.swept.isSolved"))
-    assert player.run("return pendulum.lesson.swept.sweeps") == solved
-    assert player.run("return Math.min(...pendulum.lesson.swept.values)") == exact
+    wait_for(lambda: learner.run("return pendulum.lesson.swept.isSolved"))
+    assert learner.run("return pendulum.lesson.swept.sweeps") == solved
+    assert learner.run("return Math.min(...pendulum.lesson.swept.values)") == exact
 
 
 def test_backup_of_a_cell_is_the_equation(pages: dict[str, str], player: Player) -> None:
@@ -273,10 +269,9 @@ def test_backup_of_a_cell_is_the_equation(pages: dict[str, str], player: Player)
         assert best == int(np.argmax(q))
 
 
-def test_maps_show_the_network_and_where_it_was(pages: dict[str, str], player: Player) -> None:
-    open_lesson(player, pages["one"])
-    step(player, 1)
-    efforts, values, visits, path = player.run(
+def test_maps_show_the_network_and_where_it_was(learner: Player) -> None:
+    step(learner, 1)
+    efforts, values, visits, path = learner.run(
         "const { efforts, values, visits, path } = pendulum.lesson.runs[0].last;"
         "return [efforts, values, visits].map(a => Array.from(a)).concat([path])"
     )
@@ -287,15 +282,15 @@ def test_maps_show_the_network_and_where_it_was(pages: dict[str, str], player: P
     }
     seen = {divmod(i, 49) for i, count in enumerate(visits) if count}
     assert len(cells ^ seen) <= 2  # a state on the edge of a cell
-    found = player.run(
+    found = learner.run(
         "const state = cellState(pendulum.page.task, 49, 10, 30);"
         "return pendulum.lesson.backup(pendulum.lesson.runs[0], state)"
     )
     assert values[10 * 49 + 30] == pytest.approx(max(found["qValues"]), abs=1e-5)
     assert efforts[10 * 49 + 30] == pytest.approx(found["efforts"][found["best"]])
     for layer in ("value", "error", "visits", "effort"):
-        player.driver.find_element(By.CSS_SELECTOR, f'[data-learned-layer="{layer}"]').click()
-        wait_for(lambda: player.find("learned-scale").get_attribute("data-scale") == layer)  # noqa: B023
+        learner.driver.find_element(By.CSS_SELECTOR, f'[data-learned-layer="{layer}"]').click()
+        wait_for(lambda: learner.find("learned-scale").get_attribute("data-scale") == layer)  # noqa: B023
 
 
 def test_cartpole_learns_in_the_page(pages: dict[str, str], player: Player) -> None:
@@ -344,9 +339,3 @@ def test_lesson_fits_every_screen(pages: dict[str, str], player: Player) -> None
             42 if width < 960 else 32,
         )
         assert small == [], width
-
-
-def test_worker_makes_no_network_request(pages: dict[str, str], player: Player) -> None:
-    open_lesson(player, pages["one"])
-    step(player, 1)
-    assert player.run("return performance.getEntriesByType('resource').length") == 0

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from typing import Any
-
 import gymnasium
 import numpy as np
 import pytest
 from conftest import ROOT
+from test_probes import module_of
 
 import keras_pendulum as kp
 
-_PATH = ROOT / "examples" / "sb3_dqn.py"
+example = module_of(ROOT / "examples" / "sb3_dqn.py")
 
 
-@pytest.fixture
-def example(monkeypatch: pytest.MonkeyPatch) -> Any:
-    spec = importlib.util.spec_from_file_location("sb3_dqn", _PATH)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "sb3_dqn", module)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_index_acts_as_its_torque_and_the_reward_is_scaled(example: Any) -> None:
+def test_index_acts_as_its_torque_and_the_reward_is_scaled() -> None:
     env, plain = example.make_env(), gymnasium.make("Pendulum-v1")
     assert env.action_space.n == len(example.TORQUES)
     for each in (env, plain):
@@ -38,7 +25,7 @@ def test_index_acts_as_its_torque_and_the_reward_is_scaled(example: Any) -> None
         assert reward == pytest.approx(0.02 * float(plain_reward))
 
 
-def test_short_training_can_be_evaluated(example: Any) -> None:
+def test_short_training_can_be_evaluated() -> None:
     pytest.importorskip("stable_baselines3")
     model = example.train(example.make_env(), steps=1_400)
     score = kp.evaluate_policy(

@@ -97,6 +97,7 @@ def test_folder_of_a_study_has_the_names_of_its_arms_and_at_most_150_letters() -
         ("a: reference batchsize=8", "unknown setting batchsize; did you mean batch_size"),
         ("a: reference episodes=-1", "episodes is -1"),
         ("a: reference episodes", "expected field=value"),
+        ("a: reference tau=0.1 tau=0.2", "the arm 'a' sets tau twice"),
         ("a: reference seed=3", "cannot set seed"),
         ("a: reference evaluate_every=50", "cannot set evaluate_every: a study evaluates each run"),
         ("a: reference save_every=7", "cannot set save_every: .* saves no weights$"),

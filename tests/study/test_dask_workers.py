@@ -20,8 +20,8 @@ import psutil
 import pytest
 from conftest import TESTS, environment_restored, running_module, wait_for
 from distributed import LocalCluster
+from test_results_folder import make_job
 
-from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.study import dask_workers
 from keras_pendulum.study.dask_workers import cluster_workers, dashboard, local_workers
@@ -38,10 +38,6 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(dask_workers, "_FIRST_WORKER_SECONDS", 600)
     with environment_restored():
         yield
-
-
-def make_job(seed: int) -> Job:
-    return Job("arm", "arm", preset("reference", seed=seed), {})
 
 
 def describe_worker(job: Job) -> Reply:

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage import atomic_write
 from keras_pendulum.study import results_folder
@@ -25,6 +26,10 @@ from keras_pendulum.study.job import (
     evaluate_every,
 )
 from keras_pendulum.study.results_folder import ResultsFolder
+
+
+def make_job(seed: int) -> Job:
+    return Job("arm", "arm", preset("reference", seed=seed), {})
 
 
 def reply(job: Job) -> Reply:

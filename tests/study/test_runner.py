@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 from conftest import wait_for
 from distributed import Client, LocalCluster
-from test_results_folder import reply
+from test_results_folder import make_job, reply
 
-from keras_pendulum.config.presets import preset
 from keras_pendulum.errors import UserError
 from keras_pendulum.study import __main__ as study_command
 from keras_pendulum.study import dask_workers
@@ -32,10 +31,6 @@ def client() -> Iterator[Client]:
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
-
-
-def make_job(seed: int) -> Job:
-    return Job("arm", "arm", preset("reference", seed=seed), {})
 
 
 def flaky_work(

@@ -66,10 +66,6 @@ function drawBars(canvas, colours, task, { efforts, values, exact, best, end, ta
   if (taken !== null) {
     context.fillStyle = colours.accent;
     const x = place(taken);
-    context.beginPath();
-    context.moveTo(x, bottom + 1);
-    context.lineTo(x - 5, bottom + 8);
-    context.lineTo(x + 5, bottom + 8);
-    context.fill();
+    polygon(context, [[x, bottom + 1], [x - 5, bottom + 8], [x + 5, bottom + 8]]);
   }
 }

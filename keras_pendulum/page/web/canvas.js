@@ -7,15 +7,17 @@ function readColours(maxEffort) {
   const colours = Object.fromEntries(
     [...names, "halo", "hatch"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
   );
-  const channels = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
-  const [minus, none, plus] = [colours.minus, colours.none, colours.plus].map(channels);
+  const { minus, none, plus } = colours;
   /** Returns red, green and blue of an effort. */
-  colours.ofEffort = (effort) => {
-    const share = Math.abs(effort) / maxEffort;
-    const end = effort < 0 ? minus : plus;
-    return none.map((channel, i) => Math.round(channel + share * (end[i] - channel)));
-  };
+  colours.ofEffort = (effort) => mixed(none, effort < 0 ? minus : plus, Math.abs(effort) / maxEffort);
   return colours;
+}
+
+/** Returns red, green and blue between two colours #rrggbb. */
+function mixed(from, to, share) {
+  const channels = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
+  const [first, second] = [channels(from), channels(to)];
+  return first.map((channel, i) => Math.round(channel + share * (second[i] - channel)));
 }
 
 /** Clears a canvas at the resolution of the screen; returns its context and its size in CSS pixels. */
@@ -39,6 +41,18 @@ function line(context, points) {
   context.beginPath();
   points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
   context.stroke();
+}
+
+function dot(context, x, y, radius) {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.fill();
+}
+
+function polygon(context, corners) {
+  context.beginPath();
+  corners.forEach(([x, y]) => context.lineTo(x, y));
+  context.fill();
 }
 
 function write(context, text, x, y, align = "center", baseline = "middle") {

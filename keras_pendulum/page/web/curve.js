@@ -44,7 +44,5 @@ function drawCurve(canvas, colours, { curve, levels }, here, end) {
   context.lineWidth = 1.5;
   const cursor = x(here / end);
   line(context, [[cursor, 0], [cursor, height]]);
-  context.beginPath();
-  context.arc(cursor, y(curveValue(curve, here / end)), 4, 0, 2 * Math.PI);
-  context.fill();
+  dot(context, cursor, y(curveValue(curve, here / end)), 4);
 }

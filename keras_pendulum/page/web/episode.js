@@ -8,6 +8,10 @@ function clipped(value, limit) {
   return Math.min(Math.max(value, -limit), limit);
 }
 
+function clippedShare(share) {
+  return Math.min(Math.max(share, 0), 1);
+}
+
 /** Returns the return of a policy, which returns an effort for a state. */
 function simulatedReturn(task, state, steps, policy) {
   let total = 0;

@@ -44,9 +44,8 @@ class Network {
     const [one, other] = states.map((state) => this.task.observed(state));
     const values = this.#pair(one, other ?? one);
     const { efforts } = this;
-    return states.map((_, i) => {
-      return efforts[argmax(values.subarray(i * efforts.length, (i + 1) * efforts.length))];
-    });
+    const { length } = efforts;
+    return states.map((_, i) => efforts[argmax(values, i * length, (i + 1) * length) - i * length]);
   }
 
   /** Returns the Q-values [2, A] of two observations: a state of two takes half the time of one alone. */
@@ -69,21 +68,11 @@ function decodedBytes(text) {
   return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
 }
 
-// The digits of base85 as Python writes them, with a comma in place of <.
-const BASE85 = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~";
-
-/** Returns the numbers of a text in base85 of float32: five characters each. */
+/** Returns the numbers of a text in base64 of float32. */
 function decodedFloats(text) {
-  if (text.length % 5) throw new Error("its weights are cut off");
-  const digits = new Uint8Array(128);
-  [...BASE85].forEach((character, i) => (digits[character.charCodeAt(0)] = i));
-  const bytes = new DataView(new ArrayBuffer((text.length / 5) * 4));
-  for (let i = 0, place = 0; i < text.length; place += 4) {
-    let number = 0;
-    for (const end = i + 5; i < end; i++) number = number * 85 + digits[text.charCodeAt(i)];
-    bytes.setUint32(place, number);
-  }
-  return new Float32Array(bytes.buffer); // little-endian, like every machine with a browser
+  const { buffer } = decodedBytes(text);
+  if (buffer.byteLength % 4) throw new Error("its weights are cut off");
+  return new Float32Array(buffer); // little-endian, like every machine with a browser
 }
 
 /** Returns the numbers of a text in base64 of float16, which not every browser has an array for. */
@@ -95,10 +84,10 @@ function decodedHalves(text) {
   });
 }
 
-/** Returns the index of the highest value, the lowest index among equal ones. */
-function argmax(values) {
-  let best = 0;
-  for (let i = 1; i < values.length; i++) {
+/** Returns the index of the highest value from `start` to `end`, the lowest index among equal ones. */
+function argmax(values, start = 0, end = values.length) {
+  let best = start;
+  for (let i = start + 1; i < end; i++) {
     if (values[i] > values[best]) best = i;
   }
   return best;

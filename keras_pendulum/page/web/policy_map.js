@@ -21,14 +21,6 @@ class PolicyMap {
     this.ready = false;
   }
 
-  theta(column) {
-    return ((2 * column) / (this.size - 1) - 1) * this.task.rightward * this.task.largest[0];
-  }
-
-  thetadot(row) {
-    return (1 - (2 * row) / (this.size - 1)) * this.task.largest[1];
-  }
-
   /** Computes for about `milliseconds`; returns whether the map has changed. */
   work(milliseconds) {
     if (this.ready) return false;
@@ -46,8 +38,8 @@ class PolicyMap {
 
   /** Writes the efforts of two cells: [row, column, width] each. */
   #compute(cells) {
-    const { policy, others, size } = this;
-    const states = cells.map(([row, column]) => [...others, this.theta(column), this.thetadot(row)]);
+    const { policy, task, others, size } = this;
+    const states = cells.map(([row, column]) => [...others, ...cellState(task, size, row, column)]);
     const efforts = policy.effortsOf?.(states) ?? states.map((state) => policy.effort(state));
     cells.forEach(([row, column, width], k) => {
       for (let i = row; i < Math.min(row + width, size); i++) {

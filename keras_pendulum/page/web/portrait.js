@@ -3,18 +3,13 @@
 const HATCH = 9; // px between two lines
 
 /**
- * Returns a map as a picture of `width` x `height` pixels. The efforts below 0 are hatched,
- * because both directions are equally dark.
+ * Returns the efforts of a map as a picture of `width` x `height` pixels. The efforts below 0 are
+ * hatched, because both directions are equally dark.
  */
-function mapPicture(map, colours, width, height) {
+function mapPicture(efforts, colours, width, height) {
   const picture = new OffscreenCanvas(width, height);
   const context = picture.getContext("2d");
-  context.imageSmoothingEnabled = false;
-  // The centres of the outer cells lie on the edges.
-  const [cellX, cellY] = [width / (map.size - 1), height / (map.size - 1)];
-  const draw = (colourOf) =>
-    context.drawImage(cells(map, colourOf), -cellX / 2, -cellY / 2, width + cellX, height + cellY);
-  draw((effort) => (effort < 0 ? [0, 0, 0, 255] : [0, 0, 0, 0]));
+  drawCells(context, efforts, (effort) => (effort < 0 ? [0, 0, 0, 255] : [0, 0, 0, 0]));
   context.globalCompositeOperation = "source-in"; // lines there, and nothing elsewhere
   context.strokeStyle = colours.hatch;
   const sharpness = window.devicePixelRatio || 1;
@@ -26,31 +21,31 @@ function mapPicture(map, colours, width, height) {
   }
   context.stroke();
   context.globalCompositeOperation = "destination-over";
-  draw((effort) => [...colours.ofEffort(effort), 255]);
+  drawCells(context, efforts, (effort) => [...colours.ofEffort(effort), 255]);
   return picture;
 }
 
-/** Returns a picture with one pixel for each effort of a map; `colourOf` returns RGBA. */
-function cells(map, colourOf) {
-  const picture = new OffscreenCanvas(map.size, map.size);
-  const context = picture.getContext("2d");
-  const image = context.createImageData(map.size, map.size);
+/** Draws a cell for each number of a square map over the whole canvas; `colourOf` returns RGBA. */
+function drawCells(context, numbers, colourOf) {
+  const size = Math.sqrt(numbers.length);
+  const picture = new OffscreenCanvas(size, size);
+  const pixel = picture.getContext("2d");
+  const image = pixel.createImageData(size, size);
   const pixels = new Uint32Array(image.data.buffer); // little-endian
   const seen = new Map(); // a map has few different efforts
-  map.efforts.forEach((effort, i) => {
-    if (!seen.has(effort)) {
-      const [red, green, blue, alpha] = colourOf(effort);
-      seen.set(effort, (alpha << 24) | (blue << 16) | (green << 8) | red);
+  numbers.forEach((number, i) => {
+    if (!seen.has(number)) {
+      const [red, green, blue, alpha] = colourOf(number);
+      seen.set(number, (alpha << 24) | (blue << 16) | (green << 8) | red);
     }
-    pixels[i] = seen.get(effort);
+    pixels[i] = seen.get(number);
   });
-  context.putImageData(image, 0, 0);
-  return picture;
-}
-
-/** Returns the edges of the map in a canvas: left, right, top, bottom. */
-function portraitEdges(width, height) {
-  return [46, width - 10, 8, height - 40];
+  pixel.putImageData(image, 0, 0);
+  const { width, height } = context.canvas;
+  // The centres of the outer cells lie on the edges.
+  const [cellX, cellY] = [width / (size - 1), height / (size - 1)];
+  context.imageSmoothingEnabled = false;
+  context.drawImage(picture, -cellX / 2, -cellY / 2, width + cellX, height + cellY);
 }
 
 /**
@@ -61,10 +56,8 @@ function drawPortrait(canvas, colours, task, pictureOf, paths) {
   const { context, width, height } = blank(canvas);
   const [left, right, top, bottom] = portraitEdges(width, height);
   const sharpness = canvas.width / width;
-  const [largestAngle, largestSpeed] = task.largest;
-  // What leans to the right is on the right.
-  const x = (theta) => left + (((task.rightward * theta) / largestAngle + 1) / 2) * (right - left);
-  const y = (thetadot) => top + ((1 - thetadot / largestSpeed) / 2) * (bottom - top);
+  const x = (theta) => left + placeOf(task, [theta, 0])[0] * (right - left);
+  const y = (thetadot) => top + placeOf(task, [0, thetadot])[1] * (bottom - top);
 
   context.save();
   context.beginPath();

@@ -44,20 +44,12 @@ class Touch {
 
   listenToPortrait(canvas) {
     const { page } = this;
-    const { task } = page;
-    const state = (event) => {
-      const { left: x, top: y, width, height } = canvas.getBoundingClientRect();
-      const [left, right, top, bottom] = portraitEdges(width, height);
-      const share = (event.clientX - x - left) / (right - left);
-      const rise = (event.clientY - y - top) / (bottom - top);
-      const place = [task.rightward * (2 * share - 1), 1 - 2 * rise];
-      return place.map((value, i) => clipped(value, 1) * task.largest[i]);
+    const put = (event, released) => {
+      const state = stateAt(page.task, pointedPlace(canvas, event).map(clippedShare));
+      page.putOnPortrait(...state, released);
     };
-    this.#drag(canvas, {
-      down: (event) => page.putOnPortrait(...state(event), false),
-      move: (event) => page.putOnPortrait(...state(event), false),
-      up: (event) => page.putOnPortrait(...state(event), true),
-    });
+    const hold = (event) => put(event, false);
+    this.#drag(canvas, { down: hold, move: hold, up: (event) => put(event, true) });
   }
 
   /** Returns the speed of the drag's last 0.1 s. */

@@ -101,22 +101,20 @@ class Training {
   #decoded(index) {
     const { kernels, halves } = this.recorded.training.networks[index];
     const { sizes } = this.recorded;
-    const [largestAndBiases, weights] = [decodedHalves(halves), []];
-    let [place, start] = [0, 0];
+    const largestAndBiases = decodedHalves(halves); // of the units of each layer
+    const numbers = new Float32Array((kernels.length + largestAndBiases.length) / 2);
+    let [place, start, end] = [0, 0, 0];
     for (let layer = 1; layer < sizes.length; layer++) {
       const [inputs, units] = [sizes[layer - 1], sizes[layer]];
-      const largest = largestAndBiases.subarray(start, start + units);
-      const kernel = new Float32Array(inputs * units);
-      for (let i = 0; i < kernel.length; i++, place += 2) {
+      for (let i = 0; i < inputs * units; i++, place += 2, end++) {
         const high = SIX_BITS[kernels.charCodeAt(place)];
         const low = SIX_BITS[kernels.charCodeAt(place + 1)];
-        kernel[i] = ((64 * high + low - 2048) / 2047) * largest[i % units];
+        numbers[end] = ((64 * high + low - 2048) / 2047) * largestAndBiases[start + (i % units)];
       }
-      weights.push(kernel, largestAndBiases.subarray(start + units, start + 2 * units));
+      numbers.set(largestAndBiases.subarray(start + units, start + 2 * units), end);
       start += 2 * units;
+      end += units;
     }
-    const numbers = new Float32Array(weights.reduce((sum, { length }) => sum + length, 0));
-    weights.reduce((sum, each) => (numbers.set(each, sum), sum + each.length), 0);
     const network = new Network(this.recorded, numbers, this.task);
     return { network, map: new PolicyMap(network, this.task) };
   }

@@ -68,7 +68,7 @@ class View {
     const pictureOf = (width, height) => {
       const { picture } = this;
       if (picture?.width === width && picture.height === height) return picture;
-      return (this.picture = mapPicture(page.map, colours, width, height));
+      return (this.picture = mapPicture(page.map.efforts, colours, width, height));
     };
     const paths = page.episodes.map(({ path }) => path);
     drawPortrait(element("portrait"), colours, task, pictureOf, paths);

@@ -50,9 +50,7 @@ function drawSystem(canvas, colours, states, push, task) {
   context.lineWidth = 0.1 * meter;
   line(context, [[at(x), axle], tip(x, theta, 1)]);
   context.fillStyle = colours.card;
-  context.beginPath();
-  context.arc(at(x), axle, 0.025 * meter, 0, 2 * Math.PI);
-  context.fill();
+  dot(context, at(x), axle, 0.025 * meter);
   if (push) drawPush(context, colours, [at(x), axle], meter, push);
 }
 
@@ -65,9 +63,5 @@ function drawPush(context, colours, [x, y], meter, push) {
   context.lineWidth = 0.09 * meter;
   context.lineCap = "butt";
   line(context, [[tip - direction * 0.5 * meter, y], [head, y]]);
-  context.beginPath();
-  context.moveTo(tip, y);
-  context.lineTo(head, y - 0.13 * meter);
-  context.lineTo(head, y + 0.13 * meter);
-  context.fill();
+  polygon(context, [[tip, y], [head, y - 0.13 * meter], [head, y + 0.13 * meter]]);
 }

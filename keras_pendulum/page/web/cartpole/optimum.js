@@ -29,9 +29,9 @@ class Optimum {
     return Math.max(...this.task.efforts().map((push) => this.#pushed(state, push, steps - 1)));
   }
 
-  /** Returns the Q-value of a push. */
-  qValue(state, push) {
-    return this.#pushed(state, push, LOOKAHEAD);
+  /** Returns the Q-value of each push in a state. */
+  qValues(state, pushes) {
+    return pushes.map((push) => this.#pushed(state, push, LOOKAHEAD));
   }
 
   /** Returns the optimal push in N; 0 where all is lost. */
@@ -47,13 +47,12 @@ class Optimum {
 
   /** Resolves to the exact values for a discount; null for another one than that of the table. */
   async exactValues(recorded, discount) {
-    if (discount !== this.discount) return null;
-    return new ExactValues(this.task, discount, (state) => this.value(state));
+    return discount === this.discount ? this : null;
   }
 
   #better(state) {
-    const [left, right] = this.task.efforts();
-    return this.qValue(state, right) > this.qValue(state, left) ? right : left;
+    const pushes = this.task.efforts();
+    return pushes[argmax(this.qValues(state, pushes))];
   }
 
   #pushed(state, push, steps) {

@@ -6,7 +6,7 @@ class Backup {
    * @param {number[]} state
    * @param {Network} network of the run.
    * @param {object} settings of the run.
-   * @param {?ExactValues} exact
+   * @param {?object} exact its method `qValues` returns the exact ones.
    */
   constructor(state, network, settings, exact) {
     const { task, efforts } = network;
@@ -63,14 +63,10 @@ function drawFan(canvas, colours, task, { state, steps, efforts, best }) {
     context.quadraticCurveTo(x, level, x, y); // first the old velocity, then the new one
     context.stroke();
     context.fillStyle = context.strokeStyle;
-    context.beginPath();
-    context.arc(x, y, i === best ? 5 : 3, 0, 2 * Math.PI);
-    context.fill();
+    dot(context, x, y, i === best ? 5 : 3);
   }
   context.fillStyle = colours.path;
-  context.beginPath();
-  context.arc(middle, level, 5, 0, 2 * Math.PI);
-  context.fill();
+  dot(context, middle, level, 5);
   context.fillStyle = colours.soft;
   context.font = "12px system-ui, sans-serif";
   write(context, `Δθ ±${reach[0].toFixed(2)} rad`, width - 8, height - 8, "right");
@@ -108,9 +104,5 @@ function drawBackup(canvas, colours, task, { efforts, qValues, targets, exact, b
   context.strokeStyle = colours.ink;
   line(context, curve(qValues));
   context.fillStyle = colours.accent;
-  for (const [px, py] of curve(targets)) {
-    context.beginPath();
-    context.arc(px, py, 3, 0, 2 * Math.PI);
-    context.fill();
-  }
+  for (const point of curve(targets)) dot(context, ...point, 3);
 }

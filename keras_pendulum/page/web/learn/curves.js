@@ -42,14 +42,8 @@ function drawCurves(canvas, colours, series, { end, ticks, y: share, title }) {
     line(context, points.map(([episode, value]) => [x(episode), y(value)]));
     context.setLineDash([]);
     const [episode, value] = points.at(-1);
-    context.beginPath();
-    context.arc(x(episode), y(value), 3.5, 0, 2 * Math.PI);
-    context.fill();
+    dot(context, x(episode), y(value), 3.5);
   }
-}
-
-function clippedShare(share) {
-  return Math.min(Math.max(share, 0), 1);
 }
 
 /** Returns the axis of the returns: from the lowest to the highest point, with round ticks. */

@@ -18,7 +18,7 @@ class Layers {
   /** Returns the picture of a layer of a map, `width` x `height` pixels; null where it has none. */
   picture(layer, map, width, height) {
     if (layer === "effort") {
-      return mapPicture({ size: LEARNED_MAP_SIZE, efforts: map.efforts }, this.colours, width, height);
+      return mapPicture(map.efforts, this.colours, width, height);
     }
     const numbers = this.#numbers(layer, map);
     if (!numbers) return null;
@@ -26,11 +26,7 @@ class Layers {
     const share = (value) => clippedShare((value - lowest) / (highest - lowest || 1));
     const colourOf = (value) => [...this.#colour(layer, share(value)), 255];
     const picture = new OffscreenCanvas(width, height);
-    const context = picture.getContext("2d");
-    context.imageSmoothingEnabled = false;
-    const [cellX, cellY] = [width / (LEARNED_MAP_SIZE - 1), height / (LEARNED_MAP_SIZE - 1)];
-    const small = cells({ size: LEARNED_MAP_SIZE, efforts: numbers }, colourOf);
-    context.drawImage(small, -cellX / 2, -cellY / 2, width + cellX, height + cellY);
+    drawCells(picture.getContext("2d"), numbers, colourOf);
     return picture;
   }
 
@@ -57,11 +53,4 @@ class Layers {
     if (layer === "error") return share < 0.5 ? mixed(minus, none, 2 * share) : mixed(none, plus, 2 * share - 1);
     return mixed(none, layer === "visits" ? ink : accent, share);
   }
-}
-
-/** Returns red, green and blue between two colours #rrggbb. */
-function mixed(from, to, share) {
-  const channels = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
-  const [first, second] = [channels(from), channels(to)];
-  return first.map((channel, i) => Math.round(channel + share * (second[i] - channel)));
 }

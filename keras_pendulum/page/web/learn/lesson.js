@@ -16,7 +16,7 @@ class Lesson {
     this.running = false;
     this.runs = [];
     this.problem = "";
-    this.exact = null; // {values, efforts} of the solution over the map, and `of`, its ExactValues
+    this.exact = null; // {values, efforts} of the solution over the map; `of` has its `qValues`
     this.swept = null; // the same after some sweeps, and `sweeps`
     this.canSweep = task.randomStart().length === 2; // a table on more axes takes too long
     this.#reset();
@@ -101,13 +101,13 @@ class Lesson {
   /** Computes the exact values, once. */
   async solve(optimum) {
     if (this.#solver) return;
-    this.#solver = new LearningWorker();
+    this.#solver = new LearningWorker(this.recorded);
     if (this.canSweep) {
       await this.#startSweeps();
       this.exact = this.swept = await this.#sweep({});
     } else {
       const of = await optimum.exactValues(this.recorded, this.discount);
-      const map = await this.#solver.call("optimalMap", { recorded: withoutNetworks(this.recorded) });
+      const map = await this.#solver.call("optimalMap");
       if (of) this.exact = this.swept = { ...map, of };
     }
     this.changed();
@@ -136,14 +136,12 @@ class Lesson {
   }
 
   #startSweeps() {
-    const recorded = withoutNetworks(this.recorded);
-    return this.#solver.call("startSweeps", { recorded, discount: this.discount });
+    return this.#solver.call("startSweeps", { discount: this.discount });
   }
 
   async #sweep(argument) {
     const result = await this.#solver.call("sweep", argument);
-    const table = new ValueTable(this.task, result.values);
-    const of = new ExactValues(this.task, this.discount, (state) => table.value(state));
+    const of = new ValueTable(this.task, this.discount, result.values);
     return { ...result, ...result.map, of };
   }
 

@@ -125,11 +125,10 @@ class LessonControls {
     };
     const point = (event) => {
       if (event.type === "pointermove" && event.pointerType !== "mouse" && !event.buttons) return;
-      const { left: x, top: y, width, height } = canvas.getBoundingClientRect();
-      const [left, right, top, bottom] = portraitEdges(width, height);
-      const shares = [(event.clientY - y - top) / (bottom - top), (event.clientX - x - left) / (right - left)];
       element("backup-text").setAttribute("aria-live", "off");
-      choose(...shares.map((share) => Math.round(share * (LEARNED_MAP_SIZE - 1))));
+      const place = pointedPlace(canvas, event);
+      const [column, row] = place.map((share) => Math.round(share * (LEARNED_MAP_SIZE - 1)));
+      choose(row, column);
     };
     canvas.addEventListener("pointerdown", point);
     canvas.addEventListener("pointermove", point);

@@ -121,8 +121,11 @@ class LessonView {
     const { colours, task } = this;
     const context = canvas.getContext("2d");
     const [left, right, top, bottom] = portraitEdges(canvas.clientWidth, canvas.clientHeight);
-    const [row, column] = this.cell.map((each) => each / (LEARNED_MAP_SIZE - 1));
-    const [x, y] = [left + column * (right - left), top + row * (bottom - top)];
+    const point = (state) => {
+      const [x, y] = placeOf(task, state.slice(-2));
+      return [left + x * (right - left), top + y * (bottom - top)];
+    };
+    const [x, y] = point(this.state);
     const sharpness = window.devicePixelRatio || 1;
     context.setTransform(sharpness, 0, 0, sharpness, 0, 0);
     for (const [colour, width] of [[colours.halo, 5], [colours.path, 2]]) {
@@ -131,15 +134,11 @@ class LessonView {
       context.strokeRect(x - 7, y - 7, 14, 14);
     }
     if (!backup) return;
-    const [angle, speed] = task.largest;
     const { best, efforts } = backup;
     for (const i of new Set([0, efforts.length - 1, best])) {
-      const [theta, thetadot] = backup.steps[i].state.slice(-2);
-      const px = left + (((task.rightward * theta) / angle + 1) / 2) * (right - left);
-      const py = top + ((1 - thetadot / speed) / 2) * (bottom - top);
       context.strokeStyle = i === best ? colours.path : `rgb(${colours.ofEffort(efforts[i])})`;
       context.lineWidth = 1.5;
-      line(context, [[x, y], [px, py]]);
+      line(context, [[x, y], point(backup.steps[i].state)]);
     }
   }
 

@@ -24,8 +24,8 @@ class LearningRun {
     this.regrets = []; // the records with a greedy regret
     this.last = null; // the last answer of the worker: the network, its map, the visits, a path
     this.updatesPerSecond = 0;
-    this.#worker = new LearningWorker();
-    this.#started = this.#worker.call("start", { recorded: withoutNetworks(recorded), settings });
+    this.#worker = new LearningWorker(recorded);
+    this.#started = this.#worker.call("start", { settings });
     this.#started.catch(() => {}); // `advance` rejects, too
   }
 

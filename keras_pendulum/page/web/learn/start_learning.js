@@ -68,10 +68,9 @@ function startLearning(page) {
 
 /** Measures some updates of the default network, and shows the time of a run with each size. */
 async function measureTimes(recorded, controls) {
-  const worker = new LearningWorker();
+  const worker = new LearningWorker(recorded);
   const { settings, action_count: actions } = recorded.learning;
-  const argument = { recorded: withoutNetworks(recorded), settings };
-  const { secondsPerUpdate, inputs } = await worker.call("measure", argument);
+  const { secondsPerUpdate, inputs } = await worker.call("measure");
   worker.end();
   const products = (units) =>
     [...units, actions].reduce((sum, each, i) => sum + each * [inputs, ...units][i], 0);

@@ -37,7 +37,7 @@ class Trainer {
     this.learner = new Learner(this.network, settings);
     this.replay = new ReplayBuffer(settings.replay_capacity, settings.batch_size, observation.length);
     this.episode = 0; // the next one
-    this.visits = new Visits(task);
+    this.visits = new Float32Array(LEARNED_MAP_SIZE ** 2); // of each cell of the map
     this.path = []; // of the last episode
   }
 
@@ -79,16 +79,13 @@ class Trainer {
 
   #action(state, epsilon) {
     if (this.exploration.next() <= epsilon) return this.exploration.below(this.efforts.length);
-    const values = this.network.qValues(this.task.observed(state), 1);
-    let best = 0;
-    for (let i = 1; i < this.efforts.length; i++) if (values[i] > values[best]) best = i;
-    return best;
+    return argmax(this.network.qValues(this.task.observed(state), 1), 0, this.efforts.length);
   }
 
   #store(state, action, { state: next, reward, over }, step) {
     const { settings, task } = this;
     const isLast = over || step === settings.max_episode_steps;
-    this.visits.add(state);
+    this.visits[learnedCell(task, state)] += 1;
     this.replay.add(
       task.observed(state),
       STORED_INDICES[settings.stored_index](action),

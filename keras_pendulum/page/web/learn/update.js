@@ -3,11 +3,7 @@
 // The value of a next state from the Q-values [rows, A] that start at `from`; `chosen` are those that
 // choose its action. `mean` and `none` are faults.
 const BOOTSTRAPS = {
-  maximum: (values, chosen, from, actions) => {
-    let best = from;
-    for (let i = from + 1; i < from + actions; i++) if (chosen[i] > chosen[best]) best = i;
-    return values[best];
-  },
+  maximum: (values, chosen, from, actions) => values[argmax(chosen, from, from + actions)],
   mean: (values, chosen, from, actions) => {
     let sum = 0;
     for (let i = from; i < from + actions; i++) sum += values[i];

@@ -5,8 +5,16 @@ const VALUE_ROWS = 97; // of θ̇, the ends included
 
 /** The values of a discounted task whose state is θ and θ̇, on a grid, linear between its points. */
 class ValueTable {
-  constructor(task, values = new Float64Array(VALUE_ROWS * VALUE_COLUMNS)) {
-    Object.assign(this, { task, values });
+  constructor(task, discount, values = new Float64Array(VALUE_ROWS * VALUE_COLUMNS)) {
+    Object.assign(this, { task, discount, values });
+  }
+
+  /** Returns the Q-value of each effort in a state. */
+  qValues(state, efforts) {
+    return efforts.map((effort) => {
+      const { state: next, reward } = this.task.advanced(state, effort);
+      return reward + this.discount * this.value(next);
+    });
   }
 
   /** Returns the lower left point of the cell of a state, and the state's place in the cell. */
@@ -57,7 +65,7 @@ class ValueIteration {
   constructor(task, efforts, discount) {
     Object.assign(this, { efforts, discount });
     this.sweeps = 0;
-    this.table = new ValueTable(task);
+    this.table = new ValueTable(task, discount);
     const count = this.table.values.length * efforts.length;
     this.rewards = new Float64Array(count);
     this.places = new Int32Array(4 * count); // of the next state's corners

@@ -12,7 +12,7 @@ class LearningWorker {
   #worker;
   #waiting = new Map(); // functions of the answers, by the numbers of the calls
 
-  constructor() {
+  constructor({ gravity, optimum, learning }) {
     const source = new Blob([WORKER_SOURCE, "\nserveWorker(self);"], { type: "text/javascript" });
     const address = URL.createObjectURL(source);
     this.#worker = new Worker(address);
@@ -24,6 +24,7 @@ class LearningWorker {
       else reject(new Error(problem));
     };
     this.#worker.onerror = ({ message }) => this.#rejectAll(message);
+    this.#worker.postMessage({ gravity, optimum, learning }); // what it needs of the page's content
   }
 
   /** Runs a method; returns a promise of its result. */
@@ -45,9 +46,4 @@ class LearningWorker {
     for (const { reject } of this.#waiting.values()) reject(new Error(message));
     this.#waiting.clear();
   }
-}
-
-/** Returns what a worker needs of the page's content. */
-function withoutNetworks({ gravity, optimum, learning }) {
-  return { gravity, optimum, learning };
 }

@@ -6,19 +6,17 @@ const MEASURED = 200; // updates
 
 /** What a worker does for the page: it trains one network, or iterates values. */
 class WorkerMethods {
-  /**
-   * Starts a run. Its starts come from the seed, too: `task.randomStart` draws from Math.random.
-   *
-   * @param {object} recorded the content of the page, without its networks.
-   * @param {object} settings of the run.
-   */
-  start({ recorded, settings }) {
+  /** `recorded` is the content of the page, without its networks. */
+  constructor(recorded) {
+    this.recorded = recorded;
+    this.task = new Task(recorded);
+  }
+
+  /** Starts a run. Its starts come from the seed, too: `task.randomStart` draws from Math.random. */
+  start({ settings }) {
     const source = new Random(settings.seed, 3);
     Math.random = () => source.next();
-    this.task = new Task(recorded);
-    const { action_count: count, starts, highest_return: highest } = recorded.learning;
-    this.trainer = new Trainer(this.task, settings, count);
-    this.regret = new GreedyRegret(this.task, starts, highest);
+    this.trainer = new Trainer(this.task, settings, this.recorded.learning.action_count);
     return { sizes: this.trainer.network.sizes };
   }
 
@@ -30,23 +28,24 @@ class WorkerMethods {
     while (records.length < episodes && !trainer.isFinished) {
       const record = trainer.trainEpisode();
       const isDue = trainer.isFinished || (every && trainer.episode % every === 0);
-      record.regret = isDue ? this.regret.of(trainer.network, trainer.efforts) : null;
+      record.regret = isDue ? this.#greedyRegret() : null;
       records.push(record);
     }
     return {
       records,
       seconds: (performance.now() - started) / 1000,
       weights: Float32Array.from(trainer.network.weights),
-      visits: trainer.visits.counts.slice(),
+      visits: trainer.visits.slice(),
       path: trainer.path,
       ...learnedMap(trainer.network, task, trainer.efforts),
     };
   }
 
   /** Measures updates; returns their seconds, and how many numbers an observation has. */
-  measure({ recorded, settings }) {
+  measure() {
+    const { settings, action_count: count } = this.recorded.learning;
     const rows = settings.batch_size;
-    const trainer = new Trainer(new Task(recorded), settings, recorded.learning.action_count);
+    const trainer = new Trainer(this.task, settings, count);
     const [inputs] = trainer.network.sizes;
     for (let i = 0; i < rows; i++) {
       const observation = new Float32Array(inputs).fill(i / rows);
@@ -62,18 +61,16 @@ class WorkerMethods {
   }
 
   /** Starts value iteration from 0; `efforts` are those of the network. */
-  startSweeps({ recorded, discount }) {
-    const task = new Task(recorded);
-    const efforts = task.efforts(recorded.learning.action_count);
-    this.iteration = new ValueIteration(task, efforts, discount);
+  startSweeps({ discount }) {
+    const efforts = this.task.efforts(this.recorded.learning.action_count);
+    this.iteration = new ValueIteration(this.task, efforts, discount);
     return null;
   }
 
   /** Returns the map of the optimum, for a task whose table is in the page. */
-  optimalMap({ recorded }) {
-    const task = new Task(recorded);
-    const optimum = new Optimum(recorded.optimum, task);
-    return mapOf(task, (state) => [optimum.effort(state), optimum.value(state)]);
+  optimalMap() {
+    const optimum = new Optimum(this.recorded.optimum, this.task);
+    return mapOf(this.task, (state) => [optimum.effort(state), optimum.value(state)]);
   }
 
   /** Makes some sweeps, all that the solution needs by default; returns the values and their map. */
@@ -86,19 +83,45 @@ class WorkerMethods {
       const largest = iteration.table.values.reduce((most, each) => Math.max(most, Math.abs(each)), 0);
       isSolved = change <= SOLVED * (1 - iteration.discount) * largest;
     }
-    const { table, efforts, discount, sweeps } = iteration;
-    return { values: table.values, map: sweptMap(table, efforts, discount), sweeps, isSolved };
+    const { table, efforts, sweeps } = iteration;
+    return { values: table.values, map: sweptMap(table, efforts), sweeps, isSolved };
+  }
+
+  /**
+   * Returns the highest return minus that of the greedy policy, mean over the page's fixed starts. All
+   * episodes advance together, because batches are faster.
+   */
+  #greedyRegret() {
+    const { task } = this;
+    const { network, efforts } = this.trainer;
+    const { starts, highest_return: highest } = this.recorded.learning;
+    const inputs = network.sizes[0];
+    let [states, total] = [starts, 0];
+    const observations = new Float64Array(states.length * inputs);
+    for (let step = 0; step < task.episodeSteps && states.length; step++) {
+      states.forEach((state, row) => observations.set(task.observed(state), row * inputs));
+      const values = network.qValues(observations, states.length);
+      const next = states.map((state, row) => {
+        const start = row * efforts.length;
+        return task.advanced(state, efforts[argmax(values, start, start + efforts.length) - start]);
+      });
+      total += next.reduce((sum, { reward }) => sum + reward, 0);
+      states = next.filter(({ over }) => !over).map(({ state }) => state);
+    }
+    return highest - total / starts.length;
   }
 }
 
-/** Answers the messages of the page in a worker. */
+/** Answers the messages of the page in a worker. The first one is what it needs of the content. */
 function serveWorker(scope) {
-  const methods = new WorkerMethods();
-  scope.onmessage = ({ data: { id, method, argument } }) => {
-    try {
-      scope.postMessage({ id, result: methods[method](argument) });
-    } catch (error) {
-      scope.postMessage({ id, problem: error.message });
-    }
+  scope.onmessage = ({ data: recorded }) => {
+    const methods = new WorkerMethods(recorded);
+    scope.onmessage = ({ data: { id, method, argument } }) => {
+      try {
+        scope.postMessage({ id, result: methods[method](argument) });
+      } catch (error) {
+        scope.postMessage({ id, problem: error.message });
+      }
+    };
   };
 }

@@ -46,9 +46,7 @@ function drawSystem(canvas, colours, states, torque, task) {
   context.lineWidth = rod * 0.13;
   line(context, [[0, 0], at(theta, rod * 0.935)]);
   context.fillStyle = colours.card;
-  context.beginPath();
-  context.arc(0, 0, rod * 0.03, 0, 2 * Math.PI);
-  context.fill();
+  dot(context, 0, 0, rod * 0.03);
   drawTorque(context, colours, rod, torque, task);
 }
 
@@ -71,10 +69,6 @@ function drawTorque(context, colours, rod, torque, task) {
     context.beginPath();
     context.arc(0, 0, radius, start, end, sign < 0);
     context.stroke();
-    context.beginPath();
-    context.moveTo(...point(tip, radius));
-    context.lineTo(...point(end, radius + head));
-    context.lineTo(...point(end, radius - head));
-    context.fill();
+    polygon(context, [point(tip, radius), point(end, radius + head), point(end, radius - head)]);
   }
 }

@@ -58,12 +58,11 @@ class Optimum {
   /** Resolves to the exact values for a discount, from a table that a worker makes; null for γ near 1. */
   async exactValues(recorded, discount) {
     if (!(discount <= LARGEST_DISCOUNT)) return null;
-    const worker = new LearningWorker();
+    const worker = new LearningWorker(recorded);
     try {
-      await worker.call("startSweeps", { recorded: withoutNetworks(recorded), discount });
+      await worker.call("startSweeps", { discount });
       const { values } = await worker.call("sweep");
-      const table = new ValueTable(this.task, values);
-      return new ExactValues(this.task, discount, (state) => table.value(state));
+      return new ValueTable(this.task, discount, values);
     } finally {
       worker.end();
     }
