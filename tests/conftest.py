@@ -162,19 +162,22 @@ def refusal(
 ) -> Refusal:
     """Returns the one line that a command's `main` prints for arguments that it refuses.
 
-    The command runs in a folder with a file `text.h5`, which it must not change.
+    The command runs in a folder with a file `text.h5`, in which it must not change anything.
     """
     (tmp_path / "text.h5").write_text("not weights")
     monkeypatch.chdir(tmp_path)
 
+    def content() -> dict[Path, bytes | None]:
+        return {path: path.read_bytes() if path.is_file() else None for path in tmp_path.rglob("*")}
+
     def error_line(main: Callable[[list[str]], int], words: Sequence[object]) -> str:
+        before = content()
         status = status_of(main, [str(word) for word in words])
         printed = capsys.readouterr()
         assert (status, printed.out) == (2, "")
         assert printed.err.startswith("error: ")
         assert printed.err.count("\n") == 1
-        assert [file.name for file in tmp_path.iterdir()] == ["text.h5"]
-        assert (tmp_path / "text.h5").read_text() == "not weights"
+        assert content() == before
         return printed.err
 
     return error_line

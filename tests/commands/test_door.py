@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, Refusal
 
 import keras_pendulum as kp
 from keras_pendulum import __main__ as door
@@ -82,12 +82,6 @@ def test_usage_of_a_command_is_what_the_user_typed(
     ],
 )
 def test_mistyped_command_is_one_error_line_with_the_similar_one(
-    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], message: str, refusal: Refusal
 ) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        door.main(words)
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert printed.err.startswith("error: ")
-    assert printed.err.count("\n") == 1
-    assert message in printed.err
+    assert message in refusal(door.main, words)

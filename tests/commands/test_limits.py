@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from conftest import Refusal
 
 import keras_pendulum as kp
 from keras_pendulum.evaluate import __main__ as evaluate
@@ -48,19 +49,16 @@ def test_number_at_a_limit_is_accepted_and_the_next_one_is_refused(
     command: Any,
     words: list[str],
     numbers: tuple[str, str, str, str],
-    tmp_path: Path,
+    refusal: Refusal,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def accept(*arguments: object, **named: object) -> None:
         raise kp.UserError("accepted")
 
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(FIRST_WORK[command], accept)
     accepted = []
     for number in numbers:
-        assert command.main([*words, number]) == 2
-        error = capsys.readouterr().err
+        error = refusal(command.main, [*words, number])
         accepted.append(error == "error: accepted\n")
         assert accepted[-1] or "; expected a" in error
     assert accepted == [False, True, True, False]

@@ -47,7 +47,7 @@ CASES: dict[str, tuple[Config, dict[str, Any]]] = {
 
 UPDATE = """
 const [settings, sizes, weights, batches] = arguments;
-const network = new DenseNetwork(sizes, settings.activation);
+const network = new LearningNetwork(sizes, settings.activation);
 network.weights.set(weights);
 const learner = new Learner(network, settings);
 const rows = settings.batch_size;
@@ -191,7 +191,7 @@ def test_truncated_indices_are_those_of_the_walkthrough(user: Player) -> None:
 def test_initial_weights_have_the_limits_of_the_package(rule: str, user: Player) -> None:
     network = kp.DQN((64, 64), initial_weights=rule, seed=1)
     numbers = user.run(
-        "const network = new DenseNetwork([3, 64, 64, 41], 'tanh');"
+        "const network = new LearningNetwork([3, 64, 64, 41], 'tanh');"
         "network.initialize(arguments[0], new Random(1)); return Array.from(network.weights)",
         rule,
     )

@@ -13,7 +13,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
-from conftest import status_of
+from conftest import Refusal
 from test_dask_workers import running_scheduler, running_worker
 
 from keras_pendulum.study import __main__ as study_command
@@ -167,13 +167,8 @@ WRONG = [
 
 @pytest.mark.parametrize(("words", "message"), WRONG, ids=lambda value: str(value)[:50])
 def test_mistake_is_one_error_line_and_changes_no_file(
-    words: list[str],
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    words: list[str], message: str, tmp_path: Path, refusal: Refusal
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     contents = {
         "file": "mine",
         "other/study.json": "{}",
@@ -182,22 +177,15 @@ def test_mistake_is_one_error_line_and_changes_no_file(
         "full/config.json": "",
     }
     for name, content in contents.items():
-        Path(name).parent.mkdir(exist_ok=True)
-        Path(name).write_text(content, encoding="utf-8")
-    status = status_of(study_command.main, words)
-    printed = capsys.readouterr()
-    assert (status, printed.out) == (2, "")
-    assert re.fullmatch(r"error: .*\n", printed.err)
-    assert message in printed.err
-    files = [path for path in Path().rglob("*") if path.is_file()]
-    assert {path.as_posix(): path.read_text(encoding="utf-8") for path in files} == contents
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    assert message in refusal(study_command.main, words)
 
 
 def test_missing_package_is_an_error_that_names_the_extra(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    refusal: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert study_command.main([]) == 2
-    assert capsys.readouterr().err == (
+    assert refusal(study_command.main, []) == (
         'error: scipy is not installed: pip install -e ".[study]" in the clone\n'
     )

@@ -1,37 +1,95 @@
 "use strict";
 
-/** The Q-network of the weights file: Dense layers, then one linear output for each action. */
-class Network {
+// Each function `apply` changes the first numbers of an array; each slope is that of a value after it.
+const ACTIVATIONS = {
+  tanh: {
+    apply: (values, end) => {
+      for (let i = 0; i < end; i++) values[i] = 1 - 2 / (Math.exp(2 * values[i]) + 1);
+    },
+    slope: (value) => 1 - value * value,
+  },
+  relu: {
+    apply: (values, end) => {
+      for (let i = 0; i < end; i++) if (!(values[i] > 0)) values[i] = 0;
+    },
+    slope: (value) => (value > 0 ? 1 : 0),
+  },
+  linear: { apply: () => {}, slope: () => 1 },
+};
+
+/** A Q-network: dense layers with activations, then a linear output for each action. */
+class DenseNetwork {
   /**
-   * @param {{sizes: number[], activation: string}} recorded sizes of all layers, the observation's
-   *   first; one activation for all hidden layers, or one for each, separated by commas.
-   * @param {Float32Array} numbers the weights: kernel [in, out] and bias [out] of each layer in order.
+   * @param {number[]} sizes of all layers, the observation's first.
+   * @param {string} activation one for all hidden layers, or one for each, separated by commas.
+   * @param {Float32Array|Float64Array} weights kernel [in, out] and bias [out] of each layer in order.
+   */
+  constructor(sizes, activation, weights) {
+    if (weights.length !== countWeights(sizes)) {
+      throw new Error(`it contains ${weights.length} weights; expected ${countWeights(sizes)}`);
+    }
+    Object.assign(this, { sizes, weights });
+    let start = 0;
+    const taken = (count) => weights.subarray(start, (start += count));
+    const activations = activation.split(",").map((name) => ACTIVATIONS[name]);
+    this.layers = sizes.slice(1).map((units, i) => ({
+      inputs: sizes[i],
+      units,
+      kernels: taken(sizes[i] * units),
+      biases: taken(units),
+      activation: activations[i] ?? activations[0],
+    }));
+    this.reserve(1);
+  }
+
+  /** Returns the Q-values [rows, A] of observations [rows, D]; the next call overwrites the array. */
+  qValues(observations, rows = 1) {
+    const features = this.hidden(observations, rows);
+    return this.#products(this.layers.length - 1, features, rows).subarray(0, rows * this.sizes.at(-1));
+  }
+
+  /** Returns the outputs [rows, units] of the last hidden layer. */
+  hidden(observations, rows) {
+    if (rows > this.rows) this.reserve(rows);
+    let features = observations;
+    for (let i = 0; i < this.layers.length - 1; i++) {
+      const { activation, units } = this.layers[i];
+      features = this.#products(i, features, rows);
+      activation.apply(features, rows * units);
+    }
+    return features;
+  }
+
+  #products(i, features, rows) {
+    const { kernels, biases, inputs, units } = this.layers[i];
+    const output = this.outputs[i];
+    for (let row = 0; row < rows; row++) output.set(biases, row * units);
+    addProduct(output, features, inputs, 1, kernels, rows, inputs, units);
+    return output;
+  }
+
+  reserve(rows) {
+    this.rows = rows;
+    this.outputs = this.layers.map(({ units }) => new Float64Array(rows * units));
+  }
+}
+
+/** Returns the number of weights of dense layers. */
+function countWeights(sizes) {
+  return sizes.slice(1).reduce((sum, units, i) => sum + (sizes[i] + 1) * units, 0);
+}
+
+/** The Q-network of a weights file, and its greedy policy. */
+class Network extends DenseNetwork {
+  /**
+   * @param {{sizes: number[], activation: string}} recorded see `DenseNetwork`.
+   * @param {Float32Array} numbers the weights.
    * @param {Task} task
    */
   constructor({ sizes, activation }, numbers, task) {
+    super(sizes, activation, numbers);
     this.task = task;
-    const expected = sizes.slice(1).reduce((sum, units, i) => sum + (sizes[i] + 1) * units, 0);
-    if (numbers.length !== expected) {
-      throw new Error(`it contains ${numbers.length} weights; expected ${expected}`);
-    }
-    let start = 0;
-    const activations = activation.split(",").map((name) => Network.#ACTIVATIONS[name]);
-    const taken = (count) => numbers.subarray(start, (start += count));
-    this.layers = sizes.slice(1).map((units, i) => ({
-      kernel: taken(sizes[i] * units),
-      bias: taken(units),
-      activate: i === sizes.length - 2 ? (x) => x : (activations[i] ?? activations[0]),
-      sums: new Float64Array(2 * units), // of two observations
-      output: new Float32Array(2 * units),
-    }));
     this.efforts = task.efforts(sizes.at(-1));
-  }
-
-  static #ACTIVATIONS = { tanh: Math.tanh, relu: (x) => (x > 0 ? x : 0), linear: (x) => x };
-
-  /** Returns the Q-values [A] of an observation; the next call overwrites the array. */
-  qValues(observation) {
-    return this.#pair(observation, observation).subarray(0, this.efforts.length);
   }
 
   /** Returns the greedy effort. */
@@ -39,27 +97,13 @@ class Network {
     return this.effortsOf([state])[0];
   }
 
-  /** Returns the greedy effort of each state, at most two of them. */
+  /** Returns the greedy effort of each state; two states take as long as one. */
   effortsOf(states) {
-    const [one, other] = states.map((state) => this.task.observed(state));
-    const values = this.#pair(one, other ?? one);
-    const { efforts } = this;
+    const { task, efforts } = this;
+    const observations = Float32Array.from(states.flatMap((state) => [...task.observed(state)]));
+    const values = this.qValues(observations, states.length);
     const { length } = efforts;
     return states.map((_, i) => efforts[argmax(values, i * length, (i + 1) * length) - i * length]);
-  }
-
-  /** Returns the Q-values [2, A] of two observations: a state of two takes half the time of one alone. */
-  #pair(one, other) {
-    let [features, inputs] = [Float32Array.of(...one, ...other), one.length];
-    for (const { kernel, bias, activate, sums, output } of this.layers) {
-      const units = bias.length;
-      sums.set(bias);
-      sums.set(bias, units);
-      addProduct(sums, features, inputs, 1, kernel, 2, inputs, units);
-      for (let j = 0; j < 2 * units; j++) output[j] = activate(Math.fround(sums[j]));
-      [features, inputs] = [output, units];
-    }
-    return features;
   }
 }
 

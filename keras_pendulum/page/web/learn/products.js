@@ -10,10 +10,11 @@
 function addProduct(out, x, rowStride, innerStride, w, rows, inner, columns) {
   let column = 0;
   for (; column + 4 <= columns; column += 4) {
-    let row = 0;
-    for (; row + 2 <= rows; row += 2) {
+    for (let row = 0; row < rows; row += 2) {
+      const step = row + 1 < rows ? 1 : 0; // 0: an odd last row is computed twice
       const a = row * columns + column;
-      const b = a + columns;
+      const b = a + step * columns;
+      const next = step * rowStride;
       let a0 = out[a];
       let a1 = out[a + 1];
       let a2 = out[a + 2];
@@ -24,7 +25,7 @@ function addProduct(out, x, rowStride, innerStride, w, rows, inner, columns) {
       let b3 = out[b + 3];
       for (let i = 0, j = row * rowStride, k = column; i < inner; i++, j += innerStride, k += columns) {
         const u = x[j];
-        const v = x[j + rowStride];
+        const v = x[j + next];
         const w0 = w[k];
         const w1 = w[k + 1];
         const w2 = w[k + 2];
@@ -47,24 +48,16 @@ function addProduct(out, x, rowStride, innerStride, w, rows, inner, columns) {
       out[b + 2] = b2;
       out[b + 3] = b3;
     }
-    if (row < rows) {
-      for (let each = column; each < column + 4; each++) {
-        addDot(out, row * columns + each, x, row * rowStride, innerStride, w, each, columns, inner);
-      }
-    }
   }
   for (; column < columns; column++) {
     for (let row = 0; row < rows; row++) {
-      addDot(out, row * columns + column, x, row * rowStride, innerStride, w, column, columns, inner);
+      let sum = out[row * columns + column];
+      for (let i = 0, j = row * rowStride, k = column; i < inner; i++, j += innerStride, k += columns) {
+        sum += x[j] * w[k];
+      }
+      out[row * columns + column] = sum;
     }
   }
-}
-
-/** Adds the product of a row of x and a column of w to one element of out. */
-function addDot(out, place, x, j, xStride, w, k, wStride, inner) {
-  let sum = out[place];
-  for (let i = 0; i < inner; i++, j += xStride, k += wStride) sum += x[j] * w[k];
-  out[place] = sum;
 }
 
 /** Writes the transposed matrix [columns, rows] of `matrix` [rows, columns] into `out`. */

@@ -29,7 +29,7 @@ class Trainer {
     this.exploration = source(1);
     this.replaySource = source(2);
     const observation = task.observed(task.randomStart());
-    this.network = new DenseNetwork(
+    this.network = new LearningNetwork(
       [observation.length, ...settings.hidden_units, actionCount],
       settings.activation,
     );
@@ -79,7 +79,7 @@ class Trainer {
 
   #action(state, epsilon) {
     if (this.exploration.next() <= epsilon) return this.exploration.below(this.efforts.length);
-    return argmax(this.network.qValues(this.task.observed(state), 1), 0, this.efforts.length);
+    return argmax(this.network.qValues(this.task.observed(state)));
   }
 
   #store(state, action, { state: next, reward, over }, step) {

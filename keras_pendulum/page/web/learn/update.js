@@ -29,14 +29,14 @@ const LOSSES = {
 /** The DQN update of Mnih et al. 2015, as dqn/agent.py makes it. */
 class Learner {
   /**
-   * @param {DenseNetwork} online the network that acts and learns.
+   * @param {LearningNetwork} online the network that acts and learns.
    * @param {object} settings by the names of the Config, and `bootstrap`, see BOOTSTRAPS.
    */
   constructor(online, settings) {
     Object.assign(this, { online, settings });
     this.target = online;
     if (settings.target_update !== "none") {
-      this.target = new DenseNetwork(online.sizes, settings.activation);
+      this.target = new LearningNetwork(online.sizes, settings.activation);
       this.target.weights.set(online.weights);
     }
     this.optimizer = new Optimizer(settings, online.weights.length);

@@ -1,49 +1,16 @@
 "use strict";
 
-// Each function writes into its argument; each slope is that of a value that the function has returned.
-const LEARNED_ACTIVATIONS = {
-  tanh: {
-    apply: (values, end) => {
-      for (let i = 0; i < end; i++) values[i] = 1 - 2 / (Math.exp(2 * values[i]) + 1);
-    },
-    slope: (value) => 1 - value * value,
-  },
-  relu: {
-    apply: (values, end) => {
-      for (let i = 0; i < end; i++) if (!(values[i] > 0)) values[i] = 0;
-    },
-    slope: (value) => (value > 0 ? 1 : 0),
-  },
-};
-
-/**
- * A Q-network that can learn: dense layers with an activation, then a linear output for each action.
- *
- * `weights` holds the kernel [in, out] and the bias [out] of each layer in order, `gradients` what
- * belongs to them. Both are one array, so that the optimizer is one loop.
- */
-class DenseNetwork {
-  /**
-   * @param {number[]} sizes of all layers, the observation's first.
-   * @param {string} activation of the hidden layers.
-   */
+/** A Q-network that can learn. `gradients` is one array, like the weights to which they belong. */
+class LearningNetwork extends DenseNetwork {
   constructor(sizes, activation) {
-    this.sizes = sizes;
-    this.activation = LEARNED_ACTIVATIONS[activation];
-    const count = sizes.slice(1).reduce((sum, units, i) => sum + (sizes[i] + 1) * units, 0);
-    this.weights = new Float64Array(count);
-    this.gradients = new Float64Array(count);
-    let start = 0;
-    this.layers = sizes.slice(1).map((units, i) => {
-      const [inputs, kernel] = [sizes[i], start];
-      const bias = kernel + inputs * units;
-      start = bias + units;
-      const parts = (all) => [all.subarray(kernel, bias), all.subarray(bias, start)];
-      const [[kernels, biases], [kernelGradients, biasGradients]] = [this.weights, this.gradients].map(parts);
-      const turned = new Float64Array(inputs * units);
-      return { inputs, units, kernels, biases, kernelGradients, biasGradients, turned };
-    });
-    this.#reserve(1);
+    super(sizes, activation, new Float64Array(countWeights(sizes)));
+    this.gradients = new Float64Array(this.weights.length);
+    const ofWeights = ({ byteOffset, length }) => new Float64Array(this.gradients.buffer, byteOffset, length);
+    for (const layer of this.layers) {
+      layer.kernelGradients = ofWeights(layer.kernels);
+      layer.biasGradients = ofWeights(layer.biases);
+      layer.turned = new Float64Array(layer.kernels.length);
+    }
   }
 
   /** Draws the initial weights as the setting `initial_weights` says, see dqn/network.py. */
@@ -59,20 +26,10 @@ class DenseNetwork {
     });
   }
 
-  /** Returns the Q-values [rows, A] of observations [rows, D]; the next call overwrites the array. */
-  qValues(observations, rows) {
-    const { kernels, biases, inputs, units } = this.layers.at(-1);
-    const features = this.#hidden(observations, rows);
-    const output = this.outputs.at(-1);
-    for (let row = 0; row < rows; row++) output.set(biases, row * units);
-    addProduct(output, features, inputs, 1, kernels, rows, inputs, units);
-    return output;
-  }
-
   /** Writes the Q-values [rows] of the actions [rows] that were taken in observations [rows, D]. */
   takenValues(observations, actions, rows, values) {
     const { kernels, biases, inputs, units } = this.layers.at(-1);
-    const features = this.#hidden(observations, rows);
+    const features = this.hidden(observations, rows);
     for (let row = 0; row < rows; row++) {
       const action = actions[row];
       let sum = biases[action];
@@ -92,7 +49,7 @@ class DenseNetwork {
     for (let i = head - 1; i >= 0; i--) {
       const { inputs, units, kernels, kernelGradients, biasGradients, turned } = this.layers[i];
       const [output, deltas] = [this.outputs[i], this.deltas[i]];
-      const { slope } = this.activation;
+      const { slope } = this.layers[i].activation;
       for (let row = 0, k = 0; row < rows; row++) {
         for (let unit = 0; unit < units; unit++, k++) {
           deltas[k] *= slope(output[k]);
@@ -123,24 +80,8 @@ class DenseNetwork {
     }
   }
 
-  /** Returns the outputs [rows, units] of the last hidden layer. */
-  #hidden(observations, rows) {
-    if (rows > this.rows) this.#reserve(rows);
-    let features = observations;
-    for (let i = 0; i < this.layers.length - 1; i++) {
-      const { kernels, biases, inputs, units } = this.layers[i];
-      const output = this.outputs[i];
-      for (let row = 0; row < rows; row++) output.set(biases, row * units);
-      addProduct(output, features, inputs, 1, kernels, rows, inputs, units);
-      this.activation.apply(output, rows * units);
-      features = output;
-    }
-    return features;
-  }
-
-  #reserve(rows) {
-    this.rows = rows;
-    this.outputs = this.layers.map(({ units }) => new Float64Array(rows * units));
+  reserve(rows) {
+    super.reserve(rows);
     this.deltas = this.layers.map(({ units }) => new Float64Array(rows * units));
   }
 }
