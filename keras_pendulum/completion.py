@@ -50,13 +50,8 @@ def weights_files(shipped: Callable[[], Iterable[str]]) -> Completer:
     return complete
 
 
-def folders(prefix: str, **_: Any) -> list[str]:
-    """Offers folders."""
-    return paths(prefix)
-
-
-def paths(prefix: str, *endings: str) -> list[str]:
-    """Returns the folders, and the files with these endings, whose path starts with `prefix`.
+def paths(prefix: str, *endings: str, **_: Any) -> list[str]:
+    """Offers the folders, and the files with these endings, whose path starts with `prefix`.
 
     A folder ends with a slash. Names that start with a dot are offered when the dot is typed.
     """

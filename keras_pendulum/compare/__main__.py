@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import OneLineParser, nonempty_path, require_ending, run_command
-from keras_pendulum.completion import complete_with, folders
+from keras_pendulum.completion import complete_with, paths
 from keras_pendulum.errors import UserError, one_line
 from keras_pendulum.status import status
 from keras_pendulum.storage.atomic_write import require_no_other_file, write_atomically
@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         metavar="FILE.png",
         help="file of the figure [comparison.png]",
     )
-    complete_with(runs, folders)
+    complete_with(runs, paths)
     arguments = parser.parse_args(argv)
     return run_command(lambda: _compare(arguments))
 

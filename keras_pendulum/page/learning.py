@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from keras_pendulum.config.config import Config
@@ -29,8 +29,7 @@ class Switch:
 
     title: str
     sentence: str
-    changes: dict[str, Any] = field(default_factory=dict)  # settings of the Config
-    own: dict[str, Any] = field(default_factory=dict)  # of OWN_SETTINGS
+    changes: dict[str, Any]  # settings of the Config, or of OWN_SETTINGS
 
 
 # By their names in the address of the page.
@@ -74,12 +73,12 @@ SWITCHES = {
     "reward-sign": Switch(
         "Reward with the wrong sign",
         "What is bad earns most, so the agent learns the worst behaviour.",
-        own={"reward_factor": -1.0},
+        {"reward_factor": -1.0},
     ),
     "reward-scale": Switch(
         "Rewards times 100",
         "The values are a hundred times larger, and the weights grow too slowly to reach them.",
-        own={"reward_factor": 100.0},
+        {"reward_factor": 100.0},
     ),
     "no-exploration": Switch(
         "ε = 0",
@@ -94,17 +93,17 @@ SWITCHES = {
     "no-bootstrapping": Switch(
         "No bootstrapping",
         "The target is the reward alone, without γ max Q(s′), so no action counts beyond its step.",
-        own={"bootstrap": "none"},
+        {"bootstrap": "none"},
     ),
     "mean-for-maximum": Switch(
         "Mean for maximum",
         "The target takes the mean of the next Q-values, those of a policy that acts at random.",
-        own={"bootstrap": "mean"},
+        {"bootstrap": "mean"},
     ),
     "truncation-as-end": Switch(
         "Truncation stored as an end",
         "The last step of a truncated episode gets no γ max Q(s′), as if the task ended there.",
-        own={"stored_end": "over"},
+        {"stored_end": "over"},
     ),
 }
 
@@ -122,13 +121,15 @@ def learning_config(task: Task) -> Config:
     return base.change(hidden_units=_SMALL, evaluate_every=_EVALUATE_EVERY)
 
 
-def switched(config: Config, switch: Switch) -> Config | None:
-    """Returns the settings with a fault, as far as a Config has it; None where it changes none."""
+def switched(config: Config, switch: Switch) -> dict[str, Any]:
+    """Returns the settings that a fault changes; it changes none where the task cannot have it."""
+    own = {name: value for name, value in switch.changes.items() if name in OWN_SETTINGS}
     try:
-        changed = config.change(**switch.changes)
+        changed = config.change(**{k: v for k, v in switch.changes.items() if k not in own})
     except ConfigError:  # such as truncated indices of a task without torques
-        return None
-    return changed if switch.own or changed != config else None
+        return {}
+    healthy = vars(config)
+    return {k: v for k, v in vars(changed).items() if v != healthy[k]} | own
 
 
 def highest_return(task: Task) -> float:
@@ -139,16 +140,13 @@ def highest_return(task: Task) -> float:
 def learning_content(task: Task) -> dict[str, Any]:
     """Returns the settings by the names of the Config, the switches, and starts [N, D]."""
     config = learning_config(task)
-    healthy = vars(config)
-    switches = []
-    for name, switch in SWITCHES.items():
-        changed = switched(config, switch)
-        if changed is not None:
-            changes = {key: value for key, value in vars(changed).items() if value != healthy[key]}
-            texts = {"name": name, "title": switch.title, "sentence": switch.sentence}
-            switches.append({**texts, "changes": {**changes, **switch.own}})
+    switches = [
+        {"name": name, "title": switch.title, "sentence": switch.sentence, "changes": changes}
+        for name, switch in SWITCHES.items()
+        if (changes := switched(config, switch))
+    ]
     return {
-        "settings": {**healthy, **OWN_SETTINGS},
+        "settings": {**vars(config), **OWN_SETTINGS},
         "action_count": task.action_count(config.torque_count),
         "starts": task.starts(SEEDS).tolist(),
         "highest_return": highest_return(task),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
-from keras_pendulum.completion import complete_with, folders, names_with_commas
+from keras_pendulum.completion import complete_with, names_with_commas, paths
 from keras_pendulum.config.presets import PRESETS
 from keras_pendulum.errors import UserError
 from keras_pendulum.study.arms import Arm, default_arms, own_arms, study_name
@@ -67,7 +67,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
         help="use the workers of this Dask scheduler, such as tcp://10.0.0.1:8786",
     )
     complete_with(presets, names_with_commas(PRESETS))
-    complete_with(out, folders)
+    complete_with(out, paths)
     arguments = parser.parse_args(argv)
     return run_command(lambda: _study(arguments))
 

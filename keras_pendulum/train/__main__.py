@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keras_pendulum.cli import OneLineParser, nonempty_path, run_command
-from keras_pendulum.completion import complete_with, folders, names, weights_files
+from keras_pendulum.completion import complete_with, names, paths, weights_files
 from keras_pendulum.config.flags import add_config_flags, settings_from_args
 from keras_pendulum.config.presets import PRESETS, preset
 from keras_pendulum.errors import UserError
@@ -64,7 +64,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "python -m keras_pendulu
     parser.suggest_flag("--preset", PRESETS)
     complete_with(preset_flag, names(PRESETS))
     complete_with(init_flag, weights_files(shipped_names))
-    complete_with(out_flag, folders)
+    complete_with(out_flag, paths)
     arguments = parser.parse_args(argv)
     return run_command(lambda: _train(arguments))
 

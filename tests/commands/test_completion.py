@@ -11,7 +11,7 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.__main__ import COMMANDS
-from keras_pendulum.completion import folders, names, names_with_commas, weights_files
+from keras_pendulum.completion import names, names_with_commas, paths, weights_files
 from keras_pendulum.config.presets import PRESETS
 
 PACKAGE = Path(kp.__file__).parent
@@ -103,10 +103,10 @@ def test_names_with_commas_are_offered_once() -> None:
 
 
 def test_folders_and_weights_files_are_offered_with_their_path(folder: Path) -> None:
-    assert folders("") == ["runs/"]
-    assert folders(".c") == [".cache/"]
-    assert folders(f"{folder}/ru") == [f"{folder}/runs/"]
-    assert folders("no/such/folder/") == []
+    assert paths("") == ["runs/"]
+    assert paths(".c") == [".cache/"]
+    assert paths(f"{folder}/ru") == [f"{folder}/runs/"]
+    assert paths("no/such/folder/") == []
     assert weights_files(lambda: ["model"])("mo") == ["model", "model.keras"]
 
 
@@ -115,4 +115,4 @@ def test_home_folder_is_completed_as_it_is_typed(
 ) -> None:
     monkeypatch.setenv("HOME", str(folder))
     monkeypatch.setenv("USERPROFILE", str(folder))
-    assert folders("~/ru") == ["~/runs/"]
+    assert paths("~/ru") == ["~/runs/"]

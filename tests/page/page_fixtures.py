@@ -88,6 +88,16 @@ def pages(files: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> d
     return _Pages(files, tmp_path_factory.mktemp("pages"))
 
 
+@pytest.fixture(scope="session")
+def lesson(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file that `page --lesson` writes."""
+    from keras_pendulum.page import __main__ as page_command
+
+    out = tmp_path_factory.mktemp("lesson") / "lesson.html"
+    assert page_command.main(["--lesson", "--out", str(out)]) == 0
+    return out
+
+
 @pytest.fixture
 def duel(pages: dict[str, str]) -> str:
     """The address of a page with two networks."""

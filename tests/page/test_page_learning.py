@@ -21,7 +21,7 @@ from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.environments.actions import truncated_index
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.environments.tasks import make_task
-from keras_pendulum.page.learning import OWN_SETTINGS, SWITCHES, learning_config, switched
+from keras_pendulum.page.learning import OWN_SETTINGS, SWITCHES, learning_config
 from keras_pendulum.train.run import make_optimizer, make_run
 
 if TYPE_CHECKING:
@@ -39,11 +39,11 @@ CASES: dict[str, tuple[Config, dict[str, Any]]] = {
     "huber": (HEALTHY.change(loss="huber", gradient_clip=1e-3, double_q=True), {}),
     "one layer": (HEALTHY.change(hidden_units=(21,), optimizer="adamw", weight_decay=0.1), {}),
     "average": (HEALTHY.change(average_updates=3, episodes=42), {}),
-} | {
-    name: (changed, switch.own)
-    for name, switch in SWITCHES.items()
-    if (changed := switched(HEALTHY, switch))
 }
+for name, switch in SWITCHES.items():
+    own = {key: value for key, value in switch.changes.items() if key in OWN_SETTINGS}
+    others = {key: value for key, value in switch.changes.items() if key not in own}
+    CASES[name] = HEALTHY.change(**others), own
 
 UPDATE = """
 const [settings, sizes, weights, batches] = arguments;

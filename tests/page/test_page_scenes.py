@@ -13,13 +13,6 @@ from selenium.webdriver.common.by import By
 from keras_pendulum.page import __main__ as page_command
 
 
-@pytest.fixture(scope="module")
-def lesson(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("lesson") / "lesson.html"
-    assert page_command.main(["--lesson", "--out", str(out)]) == 0
-    return out
-
-
 def test_lesson_is_one_small_file_that_is_readable_without_javascript(lesson: Path) -> None:
     text = lesson.read_text(encoding="utf-8")
     assert len(text.encode()) < 2_500_000
