@@ -125,8 +125,6 @@ def _fill(content: dict[str, Any], folder: str, lesson: bool) -> str:
 
     texts = {"folder": folder, **json.loads(read(f"{folder}/texts.json"))}
     texts["scenes"] = read("scenes/scenes.html") if lesson else ""
-    script = '<script src="scenes/scenes.js"></script>'
-    texts["script of the lesson"] = script if lesson else ""
     page = re.sub(r"\{\{(.+?)\}\}", lambda m: texts[m[1]], read("page.html"))
     page = re.sub(
         r'<link rel="stylesheet" href="(.+)">', lambda m: f"<style>\n{read(m[1])}</style>", page

@@ -21,7 +21,6 @@ from keras_pendulum.tensorflow_setup import require_tensorflow
 if TYPE_CHECKING:
     from keras_pendulum.study.job import Job, Reply
     from keras_pendulum.study.results_folder import ResultsFolder
-    from keras_pendulum.study.runner import FinishedJob
 
 _MAX_SEEDS = 100_000
 _MAX_WORKERS = 512
@@ -90,7 +89,7 @@ def _study(arguments: argparse.Namespace) -> int:
     folder = ResultsFolder(path, arms, arguments.seeds)
     folder.require_usable()
     total = folder.job_count
-    failures: list[FinishedJob] = []
+    failures: list[str] = []
     try:
         missing = folder.missing_jobs(_print_problem)
         if finished := total - len(missing):
@@ -108,7 +107,7 @@ def _study(arguments: argparse.Namespace) -> int:
         raise
     _write_tables(folder, arms)
     if failures:
-        reasons = "; ".join(f"{failure.job}: {failure.problem}" for failure in failures[:5])
+        reasons = "; ".join(failures[:5])
         more = f"; and {len(failures) - 5} more" if len(failures) > 5 else ""
         _print_problem(
             f"error: {len(failures)} of {total} runs failed ({reasons}{more}); run the same "
@@ -119,15 +118,15 @@ def _study(arguments: argparse.Namespace) -> int:
 
 def _make_runs(
     folder: ResultsFolder, jobs: Sequence[Job], arguments: argparse.Namespace
-) -> list[FinishedJob]:
-    """Makes the runs and prints a line for each; returns the failed ones."""
+) -> list[str]:
+    """Makes the runs and prints a line for each; returns one for each that has failed."""
     from dask.system import CPU_COUNT
 
     from keras_pendulum.study.dask_workers import cluster_workers, dashboard, local_workers
     from keras_pendulum.study.job import train_and_score
     from keras_pendulum.study.runner import run_all
 
-    failures: list[FinishedJob] = []
+    failures: list[str] = []
     replies: list[Reply] = []
     started = time.perf_counter()
     if arguments.scheduler:
@@ -137,10 +136,9 @@ def _make_runs(
     with connected as client, folder.create_and_lock():
         if address := dashboard(client):
             print(f"Dashboard: {address}", flush=True)
-        for finished in run_all(client, train_and_score, jobs, _print_problem):
-            job, reply, problem = finished
+        for job, reply, problem in run_all(client, train_and_score, jobs, _print_problem):
             if reply is None:
-                failures.append(finished)
+                failures.append(f"{job}: {problem}")
                 _print_problem(f"{job}: failed, {problem}")
                 continue
             result = folder.save(job, reply)

@@ -11,15 +11,12 @@ class Layers {
    */
   constructor(task, colours, exact) {
     Object.assign(this, { task, colours, exact });
-    const numbers = exact ? Array.from(exact.values) : [];
-    this.range = numbers.length ? [Math.min(...numbers), Math.max(...numbers)] : null;
+    this.range = exact && [Math.min(...exact.values), Math.max(...exact.values)];
   }
 
   /** Returns the picture of a layer of a map, `width` x `height` pixels; null where it has none. */
   picture(layer, map, width, height) {
-    if (layer === "effort") {
-      return mapPicture(map.efforts, this.colours, width, height);
-    }
+    if (layer === "effort") return mapPicture(map.efforts, this.colours, width, height);
     const numbers = this.#numbers(layer, map);
     if (!numbers) return null;
     const [lowest, highest] = this.ends(layer, map);
@@ -37,9 +34,9 @@ class Layers {
       const largest = this.range ? ERROR_SHARE * (this.range[1] - this.range[0]) : 1;
       return [-largest, largest];
     }
-    if (layer === "visits") return [0, Math.log1p(map?.visits ? map.visits.reduce((a, b) => Math.max(a, b), 0) : 1)];
+    if (layer === "visits") return [0, Math.log1p(map?.visits ? Math.max(...map.visits) : 1)];
     if (this.range) return this.range;
-    return map ? [map.values.reduce((a, b) => Math.min(a, b)), map.values.reduce((a, b) => Math.max(a, b))] : [0, 1];
+    return map ? [Math.min(...map.values), Math.max(...map.values)] : [0, 1];
   }
 
   #numbers(layer, { values, visits }) {

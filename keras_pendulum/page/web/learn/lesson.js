@@ -14,6 +14,7 @@ class Lesson {
   constructor(recorded, task, choices, changed) {
     Object.assign(this, { recorded, task, choices, changed });
     this.running = false;
+    this.isSweeping = false;
     this.runs = [];
     this.problem = "";
     this.exact = null; // {values, efforts} of the solution over the map; `of` has its `qValues`
@@ -24,7 +25,6 @@ class Lesson {
 
   #isLooping = false;
   #solver = null;
-  #isSweeping = false;
 
   /** Starts anew with other choices. */
   choose(changes) {
@@ -115,24 +115,20 @@ class Lesson {
 
   /** Shows value iteration from 0, sweep by sweep; stops it where it runs. */
   async toggleSweeps() {
-    if (this.#isSweeping || !this.exact) {
-      this.#isSweeping = false;
+    if (this.isSweeping || !this.exact) {
+      this.isSweeping = false;
       return;
     }
-    this.#isSweeping = true;
+    this.isSweeping = true;
     await this.#startSweeps();
     do {
       const began = performance.now();
       this.swept = await this.#sweep({ count: 1 });
       this.changed();
       await rested(SWEEP_PAUSE - (performance.now() - began) / 1000);
-    } while (this.#isSweeping && !this.swept.isSolved);
-    this.#isSweeping = false;
+    } while (this.isSweeping && !this.swept.isSolved);
+    this.isSweeping = false;
     this.changed();
-  }
-
-  get isSweeping() {
-    return this.#isSweeping;
   }
 
   #startSweeps() {

@@ -49,7 +49,8 @@ class Trainer {
   trainEpisode() {
     const { settings, episode, task } = this;
     let state = task.randomStart();
-    let [total, losses, updates, epsilon, over] = [0, 0, 0, 0, false];
+    let [total, epsilon, over] = [0, 0, false];
+    const losses = [];
     this.path = [state];
     for (let step = 1; step <= settings.max_episode_steps && !over; step++) {
       epsilon = EPSILON_SCHEDULES[settings.epsilon_schedule](settings, episode, this.replay.added);
@@ -60,10 +61,10 @@ class Trainer {
       total += next.reward;
       state = next.state;
       this.path.push(state);
-      if (settings.train_frequency === "step") [losses, updates] = this.#update(1, losses, updates);
+      if (settings.train_frequency === "step") this.#update(1, losses);
     }
     if (settings.train_frequency === "episode" && episode >= settings.warmup_episodes) {
-      [losses, updates] = this.#update(settings.updates_per_episode, losses, updates);
+      this.#update(settings.updates_per_episode, losses);
     }
     this.episode += 1;
     if (this.isFinished) this.learner.optimizer.averageWeights(this.network.weights);
@@ -72,7 +73,7 @@ class Trainer {
       steps: this.path.length - 1,
       episodeReturn: total,
       epsilon,
-      loss: updates ? losses / updates : null,
+      loss: losses.length ? losses.reduce((a, b) => a + b) / losses.length : null,
       updates: this.learner.optimizer.updates,
     };
   }
@@ -95,14 +96,13 @@ class Trainer {
     );
   }
 
-  /** Makes updates; returns the sum of the losses and the number of updates, each added to. */
-  #update(count, losses, updates) {
-    if (this.replay.length < this.settings.batch_size) return [losses, updates];
+  /** Makes updates, and adds their losses to the list. */
+  #update(count, losses) {
+    if (this.replay.length < this.settings.batch_size) return;
     for (let i = 0; i < count; i++) {
       const loss = this.learner.update(this.replay.sample(this.replaySource));
       if (!Number.isFinite(loss)) throw new Error("the loss is not finite: learning has diverged");
-      losses += loss;
+      losses.push(loss);
     }
-    return [losses, updates + count];
   }
 }
