@@ -237,10 +237,7 @@ def require_ending(flag: str, path: str, ending: str) -> None:
 
 
 def shell_word(path: str | os.PathLike[str]) -> str:
-    """Returns a path as a word of a command in sh, cmd and PowerShell.
-
-    No command takes the word for a flag.
-    """
+    """Returns a path as a word of sh, cmd and PowerShell that no command takes for a flag."""
     word = os.fspath(path)
     if sys.platform == "win32":
         word = word.replace("\\", "/")

@@ -95,11 +95,12 @@ def _load_policy(file: Path, arguments: argparse.Namespace) -> tuple[Policy, Tas
         from keras_pendulum.evaluate.evaluation import find_task
         from keras_pendulum.evaluate.sources import load_policy
 
+    environment, gravity = arguments.environment, arguments.gravity
     policy = load_policy(file, arguments.activation)
-    if arguments.environment:
-        policy = policy.with_environment(arguments.environment)
-    task, assumption = find_task(policy, arguments.gravity)
-    if assumption and arguments.gravity is None:
+    if environment:
+        policy = policy.with_environment(environment)
+    task, assumption = find_task(policy, gravity)
+    if assumption and gravity is None:
         print(assumption)
     return policy, task
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -119,10 +120,10 @@ def test_a_key_plays_the_training_from_its_start(page: str, player: Player) -> N
     assert player.text("play-training").startswith("Stop")
     assert player.text("status") == "The network drives."  # time runs
     assert player.run("return pendulum.page.training.shown") == 0
+    shown = "return pendulum.page.training.shown === arguments[0]"
     for index in (1, 2):
         player.run("pendulum.page.training.seconds = 3")
-        player.run("window.expected = arguments[0]", index)
-        wait_for(lambda: player.run("return pendulum.page.training.shown === expected"))
+        wait_for(partial(player.run, shown, index))
     player.press(Keys.SPACE)  # the pause stops it
     assert player.text("play-training").startswith("Play training")
     player.find("play-training").click()
