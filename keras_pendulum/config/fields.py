@@ -48,6 +48,9 @@ class Integer(Number):
     _type: ClassVar[Any] = int
 
 
+SEED = Integer(0, 2**32 - 1)  # those of an environment's reset
+
+
 @dataclass(frozen=True)
 class Integers:
     """A tuple of 1 to 16 whole numbers, each from `low` to `high`."""

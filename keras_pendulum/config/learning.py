@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from keras_pendulum.config.fields import Integer, Integers, Number, Switch, Text, setting
+from keras_pendulum.config.fields import SEED, Integer, Integers, Number, Switch, Text, setting
 from keras_pendulum.environments.tasks import TASKS
 
-_WITH_TORQUES = (
-    "environment",
-    *(name for name, task in TASKS.items() if "torque_count" in task.own_settings),
-)
+_WITH_TORQUES = ("environment", "Pendulum-v1")
 
 
 @dataclass(frozen=True)
@@ -31,7 +28,7 @@ class Learning:
         "steps after which a training episode is truncated; an evaluation uses Gymnasium's limit",
         Integer(1, 10_000),
     )
-    seed: int = setting(0, "seed of every random draw of the run", Integer(0, 2**32 - 1))
+    seed: int = setting(0, "seed of every random draw of the run", SEED)
     hidden_units: tuple[int, ...] = setting(
         (512, 256, 128), "widths of the hidden layers, comma-separated", Integers(1, 8192)
     )

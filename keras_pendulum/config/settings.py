@@ -20,15 +20,6 @@ RENAMED = {
 }
 
 
-def validate_setting(name: str, value: Any) -> Any:
-    """Returns `value` as the setting `name` stores it: 3 becomes 3.0 for a floating-point setting.
-
-    Raises ConfigError for an unknown or renamed setting, and for a value that it does not accept.
-    """
-    require_known(name)
-    return kind_of(Config.__dataclass_fields__[name]).validate(name, value)
-
-
 def parse_setting(name: str, text: str) -> Any:
     """Returns the value of `name=text`; the Config checks its range.
 

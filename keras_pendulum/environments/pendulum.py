@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from keras_pendulum.environments.task import Task
-from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
     from keras_pendulum.environments.actions import TorqueGrid
 
 STEPS_PER_EPISODE = 200
+MAX_TORQUE = 2.0  # N·m
+ROUNDING = 1e-5  # N·m; a larger excess over MAX_TORQUE is not one of float32
 MAX_SPEED = 8.0  # rad/s
 LARGEST_GRAVITY = 100.0  # m/s²
 
@@ -45,7 +46,6 @@ class Pendulum(Task):
     seconds_per_step: ClassVar[float] = 0.05
     weights_name: ClassVar[str] = "pendulum_weight.h5"
     usual_discount: ClassVar[float] = 0.9
-    own_settings: ClassVar[tuple[str, ...]] = ("gravity", "torque_count", "stored_index")
     curve_column: ClassVar[str] = "average_reward"
     curve_label: ClassVar[str] = "Reward per step"
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.config.fields import Integer
+from keras_pendulum.config.fields import SEED, Integer
 from keras_pendulum.optimum.cartpole_dynamics import (
     FORCE,
     FORCES,
@@ -84,7 +84,7 @@ class CartPoleSolution(KnownDynamics):
 
     def best_returns(self, seeds: Iterable[int], steps: int | None = None) -> Array:
         """Returns the number of steps for each seed. Raises ConfigError for one out of range."""
-        seeds = [Integer(0, 2**32 - 1).validate("seed", seed) for seed in seeds]
+        seeds = [SEED.validate("seed", seed) for seed in seeds]
         steps = self.task.steps_per_episode if steps is None else steps
         return np.full(len(seeds), float(Integer(1, 10**9).validate("steps", steps)))
 

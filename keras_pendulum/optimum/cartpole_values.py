@@ -14,9 +14,6 @@ The mirrored state has the same value, V(-s) = V(s), so half of the grid is comp
 
 from __future__ import annotations
 
-import logging
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,14 +27,11 @@ from keras_pendulum.optimum.cartpole_dynamics import (
     step_forces,
 )
 from keras_pendulum.optimum.stored_results import (
-    cache_file,
+    Arrays,
     join_words,
-    shipped_or_cached,
     split_words,
-    write_to_cache,
+    stored_or_computed,
 )
-
-_log = logging.getLogger(__name__)
 
 SHAPE = (25, 25, 31, 31)  # points of x, ẋ, θ and θ̇
 HALF = (int(np.prod(SHAPE)) + 1) // 2  # points that are stored
@@ -57,14 +51,13 @@ def cartpole_value(discount: float) -> Table:
     cache folder, if it can be written. Raises ConfigError for a discount out of range.
     """
     discount = Number(0, 1).validate("discount", discount) + 0.0  # -0.0 becomes 0.0
-    name = file_name(discount)
-    found = shipped_or_cached(name, lambda arrays: _unpack(arrays, discount))
-    if found is not None:
-        return found
-    _log.warning("Computing the exact values of CartPole for γ = %g, once: about 10 s", discount)
-    table = solve_cartpole(discount)
-    write_to_cache(cache_file(name), pack(table))
-    return table
+    return stored_or_computed(
+        file_name(discount),
+        lambda arrays: _unpack(arrays, discount),
+        lambda: solve_cartpole(discount),
+        pack,
+        f"the exact values of CartPole for γ = {discount:g}, once: about 10 s",
+    )
 
 
 def file_name(discount: float) -> str:
@@ -72,12 +65,12 @@ def file_name(discount: float) -> str:
     return f"cartpole_discount_{str(discount).removesuffix('.0')}.npz"
 
 
-def pack(table: Table) -> dict[str, NDArray[np.uint8]]:
+def pack(table: Table) -> Arrays:
     """Returns the arrays of a file: the two bytes of each value as float16."""
     return split_words(table.astype(np.float16).view(np.uint16))
 
 
-def _unpack(arrays: dict[str, NDArray[Any]], discount: float) -> Table | None:
+def _unpack(arrays: Arrays, discount: float) -> Table | None:
     """Returns the table of a file's arrays; None where they cannot be right."""
     bits = join_words(arrays, (HALF,))
     if bits is None:
@@ -124,39 +117,35 @@ def cartpole_q(
         states: [N, 4].
         forces: N, of the first step, [A]. The later ones are those of V: the better of ±10 N.
     """
-    outcomes = step_forces(states, forces)
-    following = outcomes.state.reshape(-1, 4)
-    values = _looking_ahead(_whole(table), discount, following, LOOKAHEAD)
-    values = values.reshape(outcomes.reward.shape)
-    return outcomes.reward + discount * np.where(outcomes.terminated, 0, values)
+    return _q(_whole(table), discount, states, forces, LOOKAHEAD)
 
 
 def value_at(table: Table, discount: float, states: States) -> NDArray[np.float64]:
     """Returns V at states [N, 4]; beyond the ends of the grid that of the nearest point."""
-    return _looking_ahead(_whole(table), discount, states, LOOKAHEAD)
+    return _value(_whole(table), discount, states, LOOKAHEAD)
 
 
 def greedy_forces(table: Table, states: States) -> NDArray[np.float64]:
     """Returns the forces [N] that lead to the higher V, interpolated without a look ahead."""
-    outcomes, whole = step_forces(states, FORCES), _whole(table)
-    following = [
-        np.where(outcomes.terminated[:, action], 0, _Place(outcomes.state[:, action])(whole))
-        for action in range(len(FORCES))
-    ]
-    return FORCES[(following[1] > following[0]).astype(np.intp)]
+    # Any discount above 0 gives the same order.
+    return FORCES[_q(_whole(table), 1.0, states, FORCES, steps=0).argmax(axis=1)]
 
 
-def _looking_ahead(
-    whole: Table, discount: float, states: States, steps: int
-) -> NDArray[np.float64]:
+def _value(whole: Table, discount: float, states: States, steps: int) -> NDArray[np.float64]:
     """Returns V [N]: the best sum of rewards over some exact steps, and V after them."""
     if not steps:
         return np.asarray(_Place(states)(whole), np.float64)
-    outcomes = step_forces(states, FORCES)
-    following = _looking_ahead(whole, discount, outcomes.state.reshape(-1, 4), steps - 1)
+    return np.asarray(_q(whole, discount, states, FORCES, steps - 1).max(axis=1))
+
+
+def _q(
+    whole: Table, discount: float, states: States, forces: NDArray[np.float64], steps: int
+) -> NDArray[np.float64]:
+    """Returns the Q-values [N, A]: the reward of one exact step, and V after it as in `_value`."""
+    outcomes = step_forces(states, forces)
+    following = _value(whole, discount, outcomes.state.reshape(-1, 4), steps)
     following = following.reshape(outcomes.reward.shape)
-    future = np.where(outcomes.terminated, 0, discount * following)
-    return np.asarray((outcomes.reward + future).max(axis=1))
+    return outcomes.reward + discount * np.where(outcomes.terminated, 0, following)
 
 
 def _whole(half: Table) -> Table:

@@ -11,7 +11,6 @@ its V is that of an episode's 200 steps. The number of sweeps is at most 1000, w
 
 from __future__ import annotations
 
-import logging
 from itertools import islice, pairwise
 
 import numpy as np
@@ -19,15 +18,13 @@ from numpy.typing import NDArray
 
 from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.optimum.stored_results import (
+    Arrays,
     Problem,
     are_between,
-    cache_file,
-    read,
-    write_to_cache,
+    arrays_of,
+    stored_or_computed,
 )
 from keras_pendulum.optimum.value_iteration import SPEED_STEP, solve, value_tables
-
-_log = logging.getLogger(__name__)
 
 CELLS = 400  # in [-π, 0], of the tables in the cache, 5 MB each
 TOLERANCE = 1e-4
@@ -43,16 +40,21 @@ def discounted_value(gravity: float, discount: float) -> NDArray[np.float32]:
     ConfigError for a number out of range.
     """
     problem = Problem.valid(gravity, discount=discount)
-    file = cache_file(f"value_{problem.file_name}")
-    for table in read(file, problem, "value"):
+    return stored_or_computed(
+        f"value_{problem.file_name}",
+        unpack=lambda arrays: _unpack(arrays, problem),
+        compute=lambda: solve_discounted(problem.gravity, problem.discount, CELLS),
+        pack=lambda table: {**problem._asdict(), "value": table},
+        what=f"the exact values for g = {gravity:g} and γ = {discount:g}, once: about 5 s",
+    )
+
+
+def _unpack(arrays: Arrays, problem: Problem) -> NDArray[np.float32] | None:
+    """Returns the table of a file's arrays; None where they cannot be right."""
+    for table in arrays_of(arrays, problem, "value"):
         if table.dtype == np.float32 and table.shape == _SHAPE and are_between(_LOWEST, table):
             return table
-    _log.warning(
-        "Computing the exact values for g = %g and γ = %g, once: about 5 s", gravity, discount
-    )
-    table = solve_discounted(problem.gravity, problem.discount, CELLS)
-    write_to_cache(file, {**problem._asdict(), "value": table})
-    return table
+    return None
 
 
 def solve_discounted(gravity: float, discount: float, cells: int) -> NDArray[np.float32]:

@@ -10,24 +10,20 @@ The roots of the negative values are stored, in 65536 steps, which is the most p
 
 from __future__ import annotations
 
-import logging
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum
 from keras_pendulum.optimum.stored_results import (
+    Arrays,
     Problem,
-    cache_file,
     join_words,
-    shipped_or_cached,
     split_words,
-    write_to_cache,
+    stored_or_computed,
 )
 from keras_pendulum.optimum.value_iteration import solve
-
-_log = logging.getLogger(__name__)
 
 COLUMNS = 801  # of the table
 COLUMN_STRIDE = 2
@@ -53,14 +49,13 @@ def episode_values(gravity: float) -> EpisodeValues:
     cache folder, if it can be written. Raises ConfigError for a gravity out of range.
     """
     problem = Problem.valid(gravity)
-    name = file_name(problem)
-    found = shipped_or_cached(name, _unpack)
-    if found is not None:
-        return found
-    _log.warning("Computing the optimal values for g = %g, once: about 30 s", gravity)
-    values = solve_episode(problem.gravity)
-    write_to_cache(cache_file(name), pack(values))
-    return values
+    return stored_or_computed(
+        file_name(problem),
+        _unpack,
+        lambda: solve_episode(problem.gravity),
+        pack,
+        f"the optimal values for g = {gravity:g}, once: about 30 s",
+    )
 
 
 def file_name(problem: Problem) -> str:
@@ -76,7 +71,7 @@ def solve_episode(gravity: float, columns: int = COLUMNS) -> EpisodeValues:
     return EpisodeValues(np.rint(roots / scale).astype(np.uint16), scale)
 
 
-def pack(values: EpisodeValues) -> dict[str, Any]:
+def pack(values: EpisodeValues) -> Arrays:
     """Returns the arrays of a file."""
     return {"scale": values.scale, **split_words(differences(values.roots))}
 
@@ -89,7 +84,7 @@ def differences(words: NDArray[np.uint16]) -> NDArray[np.uint16]:
     return np.diff(words.ravel(), prepend=np.uint16(0))
 
 
-def _unpack(arrays: dict[str, NDArray[Any]]) -> EpisodeValues | None:
+def _unpack(arrays: Arrays) -> EpisodeValues | None:
     """Returns the values of a file's arrays; None where they cannot be right."""
     words, scale = join_words(arrays, (ROWS * COLUMNS,)), arrays.get("scale")
     if words is None or scale is None or scale.dtype != np.float64 or scale.shape != ():

@@ -1,4 +1,11 @@
-"""The solution of the pendulum, by dynamic programming."""
+"""The solution of the pendulum, by dynamic programming.
+
+The package contains the returns of seeds 0 to 9999 for g = 1 and for g = 10, for whole episodes and
+for the training episodes of `reference` and `swingup`. It contains those of the policies that are
+optimal for the discounts of these presets, for seeds 0 to 999.
+`python -m benchmarks.learning.shipped_optima` writes them. All others are computed at their first
+use, by `best_return`, and stored in the user's cache folder.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +16,30 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE, Pendulum
-from keras_pendulum.environments.torque import MAX_TORQUE
+from keras_pendulum.config.fields import SEED
+from keras_pendulum.environments.pendulum import (
+    MAX_SPEED,
+    MAX_TORQUE,
+    STEPS_PER_EPISODE,
+    Pendulum,
+)
+from keras_pendulum.optimum.best_return import best_return, compute_returns
 from keras_pendulum.optimum.discounted import discounted_value
 from keras_pendulum.optimum.dynamics import TORQUES, simulate_return, step_all_torques
 from keras_pendulum.optimum.known_dynamics import KnownDynamics, Outcomes, Table
-from keras_pendulum.optimum.pendulum_returns import discounted_return
-from keras_pendulum.optimum.solution import RANDOM_EPISODES, Array
+from keras_pendulum.optimum.solution import RANDOM_EPISODES, USUAL_SEEDS, Array
+from keras_pendulum.optimum.stored_results import (
+    Problem,
+    cache_file,
+    read_returns,
+    shipped_file,
+    write_to_cache,
+)
 from keras_pendulum.optimum.value_iteration import value_at
 
 
 class PendulumSolution(KnownDynamics):
-    """The solution at the gravity of the task. New ones are computed, which takes about 20 s.
+    """The solution at the gravity of the task.
 
     A state is θ in rad and θ̇ in rad/s, S = 2.
     """
@@ -95,17 +114,40 @@ class PendulumSolution(KnownDynamics):
 
     def best_return_at(self, angle: float) -> float:
         """Returns the highest return from rest at an angle in degrees, which takes about 20 s."""
-        from keras_pendulum.optimum.best_return import best_return
-
         start = np.array([[math.radians(angle), 0.0]])
         return float(best_return(self.task.gravity, start, STEPS_PER_EPISODE)[0])
 
     def discounted_returns(
         self, discount: float, seeds: Iterable[int], steps: int | None = None
     ) -> NDArray[np.float64]:
-        """Returns those of `discounted_return`."""
+        """Returns the undiscounted returns of the policy that is optimal for a discount γ, 0 to 1.
+
+        Those of γ = 1 are the highest possible ones. Stored returns are read in milliseconds.
+        Others take about 20 s. They are then stored in the user's cache folder, if it can be
+        written, together with those of seeds 0 to 999.
+
+        Args:
+            discount: γ.
+            seeds: reset seeds, each 0 to 2³² - 1.
+            steps: steps per episode, 1 to 200; None takes 200.
+
+        Returns [number of seeds], in the order of `seeds`; each is attainable. Raises ConfigError
+        for a number out of range.
+        """
         steps = STEPS_PER_EPISODE if steps is None else steps
-        return discounted_return(self.task.gravity, discount, seeds, steps)
+        problem = Problem.valid(self.task.gravity, steps, discount)
+        seeds = [SEED.validate("seed", seed) for seed in seeds]
+        cache = cache_file(problem.file_name)
+        returns = read_returns(shipped_file(problem.file_name), problem)
+        if not returns.keys() >= set(seeds):
+            returns = read_returns(cache, problem) | returns
+        if not returns.keys() >= set(seeds):
+            missing = sorted({*seeds, *USUAL_SEEDS} - returns.keys())
+            computed = compute_returns(problem, self.task.starts(missing))
+            returns |= zip(missing, computed.tolist(), strict=True)
+            arrays = {"seeds": np.array(list(returns)), "returns": np.array(list(returns.values()))}
+            write_to_cache(cache, problem._asdict() | arrays)
+        return np.array([returns[seed] for seed in seeds], np.float64)
 
     def random_return(self, steps: int | None = None) -> float:
         """Returns the mean return of uniformly random torques."""

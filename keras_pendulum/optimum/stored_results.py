@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import logging
 import os
 from collections.abc import Callable
 from importlib import resources
@@ -14,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.fields import Integer, Number
-from keras_pendulum.environments.pendulum import (
-    STEPS_PER_EPISODE,
-    Pendulum,
-    validate_gravity,
-)
+from keras_pendulum.environments.pendulum import STEPS_PER_EPISODE, Pendulum, validate_gravity
 from keras_pendulum.errors import UserError
 from keras_pendulum.storage.atomic_write import write_atomically
 
+_log = logging.getLogger(__name__)
+
+Arrays = dict[str, Any]  # arrays or numbers by name, as in a file
 Result = TypeVar("Result")
 
 
@@ -53,8 +53,8 @@ class Problem(NamedTuple):
 
 
 def read_returns(path: Path | None, problem: Problem) -> dict[int, float]:
-    """Returns the returns by seed; none where `read` returns nothing, or they cannot be right."""
-    arrays = read(path, problem, "seeds", "returns")
+    """Returns the returns by seed; none of a file of another problem, or that cannot be right."""
+    arrays = arrays_of(read_arrays(path), problem, "seeds", "returns")
     if [array.dtype for array in arrays] != [np.int64, np.float64]:
         return {}
     seeds, returns = arrays
@@ -69,20 +69,20 @@ def are_between(lowest: float, values: NDArray[Any]) -> bool:
     return bool(((values >= lowest) & (values <= 0)).all())  # false for NaN
 
 
-def read(path: Path | None, problem: Problem, *names: str) -> list[NDArray[Any]]:
-    """Returns the arrays of these names in a file that also has the fields of its problem.
+def arrays_of(arrays: Arrays, problem: Problem, *names: str) -> list[NDArray[Any]]:
+    """Returns the arrays of these names from those of a file, which also has its problem's fields.
 
-    The result is empty when the file is missing, damaged, or of another problem.
+    The result is empty when one is missing, or the file is of another problem.
     """
     # A file of 200 steps or of discount 1 may leave them out.
-    found: dict[str, Any] = {"steps": STEPS_PER_EPISODE, "discount": 1.0, **read_arrays(path)}
+    found: Arrays = {"steps": STEPS_PER_EPISODE, "discount": 1.0, **arrays}
     if not found.keys() >= {*Problem._fields, *names}:
         return []
     own = all(np.array_equal(found[key], value) for key, value in problem._asdict().items())
     return [found[name] for name in names] if own else []
 
 
-def read_arrays(path: Path | None) -> dict[str, NDArray[Any]]:
+def read_arrays(path: Path | None) -> Arrays:
     """Returns the arrays of a file by name; none when it is missing or damaged."""
     if path is None:
         return {}
@@ -93,7 +93,7 @@ def read_arrays(path: Path | None) -> dict[str, NDArray[Any]]:
         return {}
 
 
-def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
+def write_arrays(path: Path, arrays: Arrays) -> None:
     """Writes a file that `read_arrays` reads. Raises UserError when it cannot be written."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
@@ -114,20 +114,32 @@ def cache_file(name: str) -> Path | None:
     return Path(base, "keras_pendulum", name)
 
 
-def shipped_or_cached(
-    name: str, unpack: Callable[[dict[str, NDArray[Any]]], Result | None]
-) -> Result | None:
-    """Returns what `unpack` makes of a file in the package, or else of one in the cache.
+def stored_or_computed(
+    name: str,
+    unpack: Callable[[Arrays], Result | None],
+    compute: Callable[[], Result],
+    pack: Callable[[Result], Arrays],
+    what: str,
+) -> Result:
+    """Returns the result in a file of the package or of the cache, else a new one.
 
-    Returns None where it makes nothing of both.
+    Args:
+        name: of the file.
+        unpack: returns the result of a file's arrays; None where they cannot be right.
+        compute: returns a new result, which is written to the cache.
+        pack: returns the arrays of a file.
+        what: is computed, and how long that takes.
     """
     for path in (shipped_file(name), cache_file(name)):
         if (found := unpack(read_arrays(path))) is not None:
             return found
-    return None
+    _log.warning("Computing %s", what)
+    result = compute()
+    write_to_cache(cache_file(name), pack(result))
+    return result
 
 
-def write_to_cache(path: Path | None, arrays: dict[str, Any]) -> None:
+def write_to_cache(path: Path | None, arrays: Arrays) -> None:
     """Writes a file of the cache for `read_arrays`, if it can be written: it only saves time."""
     if path is not None:
         with contextlib.suppress(OSError, UserError):
@@ -140,7 +152,7 @@ def split_words(words: NDArray[np.uint16]) -> dict[str, NDArray[np.uint8]]:
     return {"high": (words >> 8).astype(np.uint8), "low": (words & 255).astype(np.uint8)}
 
 
-def join_words(arrays: dict[str, NDArray[Any]], shape: tuple[int, ...]) -> Any:
+def join_words(arrays: Arrays, shape: tuple[int, ...]) -> Any:
     """Returns the numbers [shape] of `split_words`, uint16; None where the arrays are others."""
     parts = [arrays.get(name) for name in ("high", "low")]
     if any(each is None or each.dtype != np.uint8 or each.shape != shape for each in parts):

@@ -18,7 +18,7 @@ from keras_pendulum.cli import (
     run_command,
 )
 from keras_pendulum.completion import complete_with, weights_files
-from keras_pendulum.config.settings import validate_setting
+from keras_pendulum.config.fields import SEED
 from keras_pendulum.display import require_display
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import declared_task
@@ -72,7 +72,7 @@ def _play(arguments: argparse.Namespace) -> int:
     task = declared_task(arguments.environment or "Pendulum-v1").with_gravity(arguments.gravity)
     seed = arguments.seed
     if seed is not None:
-        seed = validate_setting("seed", seed)
+        seed = SEED.validate("seed", seed)
     file = find_weights(arguments.against) if arguments.against is not None else None
     require_display()
     from keras_pendulum.play.window import Window, control_c

@@ -12,7 +12,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config, Recording
 from keras_pendulum.config.fields import Integer, Number, Only, Text, kind_of
-from keras_pendulum.config.settings import read_settings, validate_setting
+from keras_pendulum.config.settings import read_settings
 
 INF, NAN = float("inf"), float("nan")
 # The lowest and the highest value of each number.
@@ -55,13 +55,13 @@ def test_every_number_has_its_limits_in_this_file() -> None:
 def test_limits_are_accepted_and_the_next_number_is_refused(name: str) -> None:
     kind: Any = kind_of(Config.__dataclass_fields__[name])
     low, high = LIMITS[name]
-    assert (validate_setting(name, low), validate_setting(name, high)) == (low, high)
+    assert (kind.validate(name, low), kind.validate(name, high)) == (low, high)
     too_low, too_high = np.nextafter([low, high], [-INF, INF]).tolist()
     if isinstance(kind, Integer):
         too_low, too_high = int(low) - 1, int(high) + 1
     for value in (too_low, too_high):
         with pytest.raises(kp.ConfigError, match=f"^{name} is .*; expected a .*number from"):
-            validate_setting(name, value)
+            kind.validate(name, value)
 
 
 @pytest.mark.parametrize("spec", dataclasses.fields(Config), ids=lambda spec: spec.name)

@@ -15,7 +15,6 @@ from keras_pendulum.config.settings import (
     RENAMED,
     parse_setting,
     read_settings,
-    validate_setting,
 )
 
 # The settings of version 0.1 that have other names now, and the line that names the new ones.
@@ -33,7 +32,6 @@ def refuse(name: str, line: str) -> None:
     """Requires that the name of a setting is refused with this line everywhere."""
     calls: dict[str, Any] = {
         "parse": lambda: parse_setting(name, "1"),
-        "validate": lambda: validate_setting(name, 1),
         "preset": lambda: kp.preset("reference", **{name: 1}),
         "read": lambda: read_settings({**vars(Config()), name: 1}),
     }

@@ -9,7 +9,7 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.optimum.pendulum_returns import discounted_return
+from keras_pendulum.optimum.pendulum import PendulumSolution
 
 
 def test_returns_equal_those_of_a_plain_loop_on_gymnasium() -> None:
@@ -63,7 +63,7 @@ def score_with_discount(regret: float) -> kp.Score:
 
 def test_regret_has_a_part_of_the_discount_and_one_of_learning() -> None:
     score = score_with_discount(2.0)
-    returns = discounted_return(1.0, 0.9, range(100))
+    returns = PendulumSolution(Pendulum()).discounted_returns(0.9, range(100))
     cost = (kp.optimal_return(1.0, range(100)) - returns).mean()
     assert score.discount_regret == pytest.approx(cost)
     assert score.learning_regret == pytest.approx(2 - cost)
@@ -185,7 +185,7 @@ def test_gravity_is_the_given_one_else_the_recorded_one(
     recorded: float | None, given: float | None, gravity: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "keras_pendulum.optimum.pendulum.discounted_return", lambda *problem: np.array([problem[0]])
+        PendulumSolution, "best_returns", lambda self, seeds: np.array([self.task.gravity])
     )
     metadata = {} if recorded is None else {"gravity": recorded}
     score = kp.evaluate_policy(kp.DQN((8,), metadata=metadata), 1, gravity=given)

@@ -65,7 +65,7 @@ def test_optimum_of_a_film_is_that_of_its_seed_or_angle(monkeypatch: pytest.Monk
         found.append((gravity, starts.tolist(), steps))
         return np.array([-7.0])
 
-    monkeypatch.setattr("keras_pendulum.optimum.best_return.best_return", best_return)
+    monkeypatch.setattr("keras_pendulum.optimum.pendulum.best_return", best_return)
     monkeypatch.setattr(film, "draw_frame", lambda *given: given[-1])
 
     def optimum(task: Task, name: str, angle: float | None = None) -> Any:

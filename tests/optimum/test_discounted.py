@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.errors import ConfigError
-from keras_pendulum.optimum import best_return, discounted, pendulum_returns
+from keras_pendulum.optimum import best_return, discounted, pendulum
 from keras_pendulum.optimum.discounted import discounted_value, solve_discounted
 from keras_pendulum.optimum.dynamics import TORQUES
 from keras_pendulum.optimum.pendulum import PendulumSolution
-from keras_pendulum.optimum.pendulum_returns import discounted_return
 from keras_pendulum.optimum.solutions import optimal_return
 from keras_pendulum.optimum.stored_results import Problem, write_arrays
 from keras_pendulum.optimum.value_iteration import solve, value_at
@@ -47,7 +46,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         table = coarse_table(gravity, discount)
         return table if cells != discounted.CELLS else np.repeat(table, 10, axis=1)[:, 9:]
 
-    monkeypatch.setattr(pendulum_returns, "USUAL_SEEDS", range(20))
+    monkeypatch.setattr(pendulum, "USUAL_SEEDS", range(20))
     monkeypatch.setattr(discounted, "solve_discounted", solve_coarsely)
     monkeypatch.setattr(best_return, "solve_discounted", solve_coarsely)
     return asked
@@ -128,7 +127,7 @@ def test_table_that_cannot_be_right_is_computed_again(
 def test_shipped_returns_are_below_the_optimum_by_what_the_discount_costs(
     gravity: float, discount: float, steps: int, cost: float, solved: list[int]
 ) -> None:
-    returns = discounted_return(gravity, discount, steps=steps)
+    returns = PendulumSolution(Pendulum(gravity)).discounted_returns(discount, range(100), steps)
     optimum = optimal_return(gravity, steps=steps)
     assert (optimum - returns).mean() == pytest.approx(cost, abs=0.02)
     assert (returns < optimum + 0.05).all()
@@ -136,7 +135,7 @@ def test_shipped_returns_are_below_the_optimum_by_what_the_discount_costs(
 
 
 def test_shipped_returns_are_those_of_a_computation(solved: list[int]) -> None:
-    shipped = discounted_return(1, 0.9, range(20))
+    shipped = PendulumSolution(Pendulum()).discounted_returns(0.9, range(20))
     computed = best_return.compute_returns(
         Problem.valid(1, discount=0.9), Pendulum().starts(range(20))
     )
@@ -145,8 +144,9 @@ def test_shipped_returns_are_those_of_a_computation(solved: list[int]) -> None:
 
 
 def test_other_returns_are_computed_once_and_stored(cache: Path, solved: list[int]) -> None:
-    first = discounted_return(1, 0.6, [3, 2000])
-    np.testing.assert_array_equal(discounted_return(1, 0.6, [2000, 5, 3])[[2, 0]], first)
+    exact = PendulumSolution(Pendulum())
+    first = exact.discounted_returns(0.6, [3, 2000])
+    np.testing.assert_array_equal(exact.discounted_returns(0.6, [2000, 5, 3])[[2, 0]], first)
     assert solved == [best_return.DISCOUNTED_CELLS]
     assert [path.name for path in cache.iterdir()] == ["gravity_1_discount_0.6.npz"]
 

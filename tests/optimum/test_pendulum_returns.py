@@ -13,7 +13,7 @@ from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.optimum import best_return as module
 from keras_pendulum.optimum.best_return import best_return
-from keras_pendulum.optimum.pendulum_returns import discounted_return
+from keras_pendulum.optimum.pendulum import PendulumSolution
 from keras_pendulum.optimum.solutions import optimal_return
 from keras_pendulum.optimum.value_iteration import greedy_return, solve, value_tables
 
@@ -213,7 +213,8 @@ def test_gravities_steps_and_seeds_at_their_limits_are_accepted(
 )
 def test_number_out_of_range_is_refused(change: dict[str, Any], problem: str) -> None:
     with pytest.raises(ConfigError, match=problem):
-        discounted_return(**{"gravity": 1.0, "discount": 1.0, **change})
+        values = {"gravity": 1.0, "discount": 1.0, "seeds": [0], **change}
+        PendulumSolution(Pendulum(values.pop("gravity"))).discounted_returns(**values)
 
 
 def test_seeds_are_accepted_in_any_order_repeated_and_empty(

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from keras_pendulum.optimum.pendulum_returns import discounted_return
+from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.optimum.pendulum import PendulumSolution
 from keras_pendulum.optimum.solutions import optimal_return
 from keras_pendulum.study.arms import own_arms
 from keras_pendulum.study.job import RunResult
@@ -42,7 +43,7 @@ def test_table_has_the_regret_that_the_discount_alone_costs() -> None:
     rows = make_rows(arms, {arm.name: [RunResult(0.0, [-9.0], [], [], [])] for arm in arms})
     costs = [row["discount_regret"] for row in json.loads(as_json(rows, {}))["rows"]]
     gamma = arms[0].config.discount
-    returns = discounted_return(1.0, gamma, range(100))
+    returns = PendulumSolution(Pendulum()).discounted_returns(gamma, range(100))
     assert costs == [pytest.approx((optimal_return(1.0, range(100)) - returns).mean()), 0.0, 0.0]
     cells = [line.rstrip("| ").split(" | ")[8] for line in as_markdown(rows).splitlines()[2:5]]
     assert cells == [f"{costs[0]:.2f}", "0.00", "0.00"]
