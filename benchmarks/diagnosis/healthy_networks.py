@@ -114,7 +114,8 @@ def _train_twin(config: Config) -> list[NDArray[np.float32]]:
     agent = twin.Agent(
         online,
         twin.from_keras(run.agent.online.get_weights()),
-        twin.soft_update(config.tau),
+        twin.q_learning,
+        partial(twin.soft_update, config.tau),
         twin.KerasAdam(
             online.parameters(), twin.cosine_rate(config.learning_rate, config.total_updates)
         ),

@@ -10,7 +10,7 @@ import keras
 import numpy as np
 import pytest
 import tensorflow as tf
-from small_agents import OBSERVATION, assert_weights, differ, make_agent, random_batches
+from small_agents import OBSERVATION, assert_weights, make_agent, random_batches
 
 from keras_pendulum.dqn.agent import Agent
 from keras_pendulum.dqn.losses import huber, mean_squared_error
@@ -20,7 +20,6 @@ from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.dqn.target_network import (
     TargetRule,
     double_q_learning,
-    hard_update,
     no_update,
     q_learning,
     soft_update,
@@ -111,20 +110,6 @@ def test_target_network_values_the_next_observation(rule: TargetRule, next_value
     agent.target.set_weights([np.zeros((3, 2)), np.array([2, 5])])  # the online choice is action 0
     (loss,) = agent.update(one_transition(action=1, reward=-1, terminated=False))
     assert loss == pytest.approx((-1 + 0.5 * next_value) ** 2 / 2)
-
-
-def test_target_changes_at_hard_updates_only() -> None:
-    agent = make_agent(update_target=partial(hard_update, 5))
-    initial = agent.target.get_weights()
-    agent.update(random_batches(4))
-    assert differ(agent.online.get_weights(), initial)
-    assert_weights(agent.target.get_weights(), initial)
-    agent.update(random_batches(1))
-    copied = agent.online.get_weights()
-    assert_weights(agent.target.get_weights(), copied)
-    agent.update(random_batches(4))
-    assert differ(agent.online.get_weights(), copied)
-    assert_weights(agent.target.get_weights(), copied)
 
 
 @pytest.mark.parametrize("tau", [0.0, 0.25])  # with 0, the optimizer alone could change the target

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -106,7 +107,7 @@ def huber(q: Tensor, action: Tensor, target: Tensor) -> Tensor:
 # Returns the TD targets [B] from the online network, the target network, a batch [B, ...] and γ.
 TargetRule = Callable[[nn.Module, nn.Module, Transitions, float], Tensor]
 # Called after each gradient step with the online network, the target network and the number of
-# gradient steps so far.
+# gradient steps so far. `partial` makes one of `soft_update` or `hard_update`.
 TargetUpdate = Callable[[nn.Module, nn.Module, int], None]
 
 
@@ -125,24 +126,16 @@ def double_q_learning(
     return double_td_target(batch.reward, batch.terminated, next_q, next_q_online, discount)
 
 
-def soft_update(tau: float) -> TargetUpdate:
-    """Returns the rule target ← tau·online + (1 - tau)·target."""
-
-    def update(online: nn.Module, target: nn.Module, steps: int) -> None:
-        for source, destination in zip(online.parameters(), target.parameters(), strict=True):
-            destination.copy_(tau * source + (1.0 - tau) * destination)
-
-    return update
+def soft_update(tau: float, online: nn.Module, target: nn.Module, steps: int) -> None:
+    """Moves target ← tau·online + (1 - tau)·target."""
+    for source, destination in zip(online.parameters(), target.parameters(), strict=True):
+        destination.copy_(tau * source + (1.0 - tau) * destination)
 
 
-def hard_update(period: int) -> TargetUpdate:
-    """Returns the rule target ← online at every `period`-th gradient step."""
-
-    def update(online: nn.Module, target: nn.Module, steps: int) -> None:
-        if steps % period == 0:
-            target.load_state_dict(online.state_dict())
-
-    return update
+def hard_update(period: int, online: nn.Module, target: nn.Module, steps: int) -> None:
+    """Copies target ← online at every `period`-th gradient step."""
+    if steps % period == 0:
+        target.load_state_dict(online.state_dict())
 
 
 def no_update(online: nn.Module, target: nn.Module, steps: int) -> None:
@@ -176,11 +169,7 @@ class KerasAdam(torch.optim.Adam):
         learning_rate: a schedule, called with the number of steps before.
     """
 
-    def __init__(
-        self,
-        parameters: Iterable[Tensor],
-        learning_rate: Callable[[int], float],
-    ) -> None:
+    def __init__(self, parameters: Iterable[Tensor], learning_rate: Callable[[int], float]) -> None:
         super().__init__(parameters, betas=BETAS)
         self.learning_rate = learning_rate
         self.iterations = 0
@@ -194,36 +183,18 @@ class KerasAdam(torch.optim.Adam):
         return super().step(closure)
 
 
+@dataclass(eq=False)
 class Agent:
-    """The update of Mnih et al. 2015.
+    """The update of Mnih et al. 2015."""
 
-    Args:
-        online: the network that learns.
-        target: the network that values the next observations.
-        update_target: changes `target` after each gradient step.
-        optimizer: of the parameters of `online`.
-        loss: a scalar from Q-values [B, A], actions [B] and TD targets [B].
-        discount: γ.
-        target_rule: makes the TD targets.
-    """
-
-    def __init__(
-        self,
-        online: DQN,
-        target: DQN,
-        update_target: TargetUpdate,
-        optimizer: KerasAdam,
-        loss: Callable[[Tensor, Tensor, Tensor], Tensor],
-        discount: float,
-        target_rule: TargetRule = q_learning,
-    ) -> None:
-        self.online = online
-        self.target = target
-        self.update_target = update_target
-        self.optimizer = optimizer
-        self.loss = loss
-        self.discount = discount
-        self.target_rule = target_rule
+    online: DQN  # the network that learns
+    target: DQN  # the network that values the next observations
+    target_rule: TargetRule  # makes the TD targets
+    update_target: TargetUpdate  # changes `target` after each gradient step
+    optimizer: KerasAdam  # of the parameters of `online`
+    # Returns a scalar from Q-values [B, A], actions [B] and TD targets [B].
+    loss: Callable[[Tensor, Tensor, Tensor], Tensor]
+    discount: float  # γ
 
     def update(self, batches: Transitions) -> NDArray[np.float32]:
         """Makes one gradient step for each of the batches [K, B, ...]; returns the losses [K]."""
