@@ -94,6 +94,13 @@ def files_read_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def optimum_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for exact results, which does not exist yet."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "keras_pendulum"
+
+
+@pytest.fixture
 def command(tmp_path: Path) -> Command:
     """Runs `python -m keras_pendulum.NAME ARGUMENTS` in an empty folder."""
 

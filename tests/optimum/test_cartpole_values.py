@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.optimum import cartpole_values
 from keras_pendulum.optimum.cartpole import CartPoleSolution
@@ -20,11 +19,9 @@ from keras_pendulum.optimum.cartpole_values import (
     cartpole_value,
     file_name,
     highest_value,
-    pack,
     solve_cartpole,
     value_at,
 )
-from keras_pendulum.optimum.stored_results import write_arrays
 
 SHIPPED = (0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
 EXACT = CartPoleSolution(CartPole())
@@ -120,40 +117,6 @@ def test_shipped_tables_are_small_and_those_that_are_computed() -> None:
     computed = solve_cartpole(0.9)
     shipped = cartpole_value(0.9)
     assert np.abs(computed - shipped).max() < 0.01
-
-
-def test_table_of_another_discount_is_computed_once_and_read_from_the_cache(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    first, again = cartpole_value(0.3), cartpole_value(0.3)
-    assert len(caplog.records) == 1 and "γ = 0.3" in caplog.text
-    assert np.abs(first - again).max() < 1e-3  # the cache has float16
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda arrays: arrays | {"high": arrays["high"][:-1]},
-        lambda arrays: arrays | {"low": arrays["low"].astype(np.float32)},
-        lambda arrays: {"high": arrays["high"]},
-        lambda arrays: arrays | {"high": np.full_like(arrays["high"], 0x7E)},  # NaN
-        lambda arrays: arrays | {"high": np.full_like(arrays["high"], 0x70)},  # 8192
-    ],
-)
-def test_damaged_table_of_the_cache_is_computed_again(
-    damage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    right = cartpole_value(0.3)
-    file = tmp_path / "keras_pendulum" / file_name(0.3)
-    write_arrays(file, damage(pack(right)))
-    assert np.abs(cartpole_value(0.3) - right).max() < 1e-3
-
-
-def test_discount_out_of_range_is_refused() -> None:
-    with pytest.raises(kp.ConfigError, match=r"^discount is 1\.5"):
-        cartpole_value(1.5)
 
 
 def test_lost_states_are_told_from_those_that_the_optimum_balances() -> None:

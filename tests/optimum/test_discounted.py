@@ -12,28 +12,21 @@ import pytest
 from numpy.typing import NDArray
 
 from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.errors import ConfigError
-from keras_pendulum.optimum import best_return, discounted, pendulum
-from keras_pendulum.optimum.discounted import discounted_value, solve_discounted
+from keras_pendulum.optimum import best_return, pendulum
+from keras_pendulum.optimum.discounted import solve_discounted
 from keras_pendulum.optimum.dynamics import TORQUES
 from keras_pendulum.optimum.pendulum import PendulumSolution
 from keras_pendulum.optimum.solutions import optimal_return
-from keras_pendulum.optimum.stored_results import Problem, write_arrays
+from keras_pendulum.optimum.stored_results import Problem
 from keras_pendulum.optimum.value_iteration import solve, value_at
 
-pytestmark = pytest.mark.quick
+pytestmark = [pytest.mark.quick, pytest.mark.usefixtures("optimum_cache")]
 CELLS = 40  # few, for speed
 
 
 @functools.cache
 def coarse_table(gravity: float, discount: float) -> NDArray[np.float32]:
     return solve_discounted(gravity, discount, CELLS)
-
-
-@pytest.fixture(autouse=True)
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return tmp_path / "keras_pendulum"
 
 
 @pytest.fixture
@@ -43,11 +36,9 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def solve_coarsely(gravity: float, discount: float, cells: int) -> Any:
         asked.append(cells)
-        table = coarse_table(gravity, discount)
-        return table if cells != discounted.CELLS else np.repeat(table, 10, axis=1)[:, 9:]
+        return coarse_table(gravity, discount)
 
     monkeypatch.setattr(pendulum, "USUAL_SEEDS", range(20))
-    monkeypatch.setattr(discounted, "solve_discounted", solve_coarsely)
     monkeypatch.setattr(best_return, "solve_discounted", solve_coarsely)
     return asked
 
@@ -86,34 +77,6 @@ def test_value_for_discount_1_is_that_of_an_episode() -> None:
     np.testing.assert_array_equal(solve_discounted(1, 1, CELLS), solve(1, 200, CELLS))
 
 
-def test_table_is_computed_once_and_stored(cache: Path, solved: list[int]) -> None:
-    first, again = (discounted_value(1, 0.5) for _ in range(2))
-    np.testing.assert_array_equal(first, again)
-    assert solved == [discounted.CELLS]
-    assert [path.name for path in cache.iterdir()] == ["value_gravity_1_discount_0.5.npz"]
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda value: value[:, :-1],
-        lambda value: -value,
-        lambda value: value.astype(np.float64),
-        lambda value: np.where(value == value.min(), np.float32(np.nan), value),
-    ],
-)
-def test_table_that_cannot_be_right_is_computed_again(
-    damage: Any, cache: Path, solved: list[int]
-) -> None:
-    right = discounted_value(1, 0.5)
-    (path,) = cache.iterdir()
-    arrays = {**Problem.valid(1, discount=0.5)._asdict(), "value": damage(right)}
-    write_arrays(path, arrays)
-    for _ in range(2):
-        np.testing.assert_array_equal(discounted_value(1, 0.5), right)
-    assert solved == [discounted.CELLS] * 2
-
-
 @pytest.mark.parametrize(
     ("gravity", "discount", "steps", "cost"),
     [
@@ -143,14 +106,9 @@ def test_shipped_returns_are_those_of_a_computation(solved: list[int]) -> None:
     assert solved == [best_return.DISCOUNTED_CELLS]
 
 
-def test_other_returns_are_computed_once_and_stored(cache: Path, solved: list[int]) -> None:
+def test_other_returns_are_computed_once_and_stored(optimum_cache: Path, solved: list[int]) -> None:
     exact = PendulumSolution(Pendulum())
     first = exact.discounted_returns(0.6, [3, 2000])
     np.testing.assert_array_equal(exact.discounted_returns(0.6, [2000, 5, 3])[[2, 0]], first)
     assert solved == [best_return.DISCOUNTED_CELLS]
-    assert [path.name for path in cache.iterdir()] == ["gravity_1_discount_0.6.npz"]
-
-
-def test_discount_out_of_range_has_no_value() -> None:
-    with pytest.raises(ConfigError, match=r"discount is 1\.1; expected a number"):
-        discounted_value(1, 1.1)
+    assert [path.name for path in optimum_cache.iterdir()] == ["gravity_1_discount_0.6.npz"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,17 +9,13 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.environments.pendulum import Pendulum
-from keras_pendulum.optimum import episode_values as module
 from keras_pendulum.optimum.episode_values import (
     COLUMNS,
     ROWS,
     EpisodeValues,
     episode_values,
-    file_name,
-    pack,
     solve_episode,
 )
-from keras_pendulum.optimum.stored_results import Problem, write_arrays
 from keras_pendulum.optimum.value_iteration import solve
 
 
@@ -31,13 +26,6 @@ def values_at_starts(values: EpisodeValues, count: int) -> Any:
     rows = np.rint((sign * speed / 8 + 1) / 2 * (ROWS - 1)).astype(int)
     columns = np.rint((1 - np.abs(theta) / np.pi) * (COLUMNS - 1)).astype(int)
     return -((values.roots[rows, columns] * values.scale) ** 2)
-
-
-def coarse(gravity: float) -> EpisodeValues:
-    """Returns values of a coarse grid, in a table of the right shape."""
-    few = solve_episode(gravity, 11)
-    columns = np.arange(COLUMNS) * 10 // (COLUMNS - 1)
-    return EpisodeValues(few.roots[:, columns], few.scale)
 
 
 @pytest.mark.parametrize("gravity", [1.0, 10.0])
@@ -53,41 +41,3 @@ def test_values_are_those_of_the_grid() -> None:
     table = solve(10.0, theta_cells=20)[::5, ::2]
     assert values.roots.shape == table.shape == (ROWS, 11)
     np.testing.assert_allclose((values.roots * values.scale) ** 2, -table, rtol=0.01, atol=0.001)
-
-
-def test_values_of_another_gravity_are_computed_once_and_read_from_the_cache(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(module, "solve_episode", coarse)
-    first, again = episode_values(3.5), episode_values(3.5)
-    assert len(caplog.records) == 1 and "g = 3.5" in caplog.text
-    assert (first.roots == again.roots).all() and first.scale == again.scale
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda arrays: arrays | {"high": arrays["high"][:-1]},
-        lambda arrays: arrays | {"low": arrays["low"].astype(np.float32)},
-        lambda arrays: {"high": arrays["high"], "low": arrays["low"]},
-        lambda arrays: arrays | {"scale": np.nan},
-        lambda arrays: arrays | {"scale": 0.0},
-        lambda arrays: arrays | {"scale": 1.0},
-        lambda arrays: arrays | {"scale": np.array([0.0001])},
-    ],
-)
-def test_damaged_values_of_the_cache_are_computed_again(
-    damage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(module, "solve_episode", coarse)
-    right = episode_values(3.5)
-    write_arrays(tmp_path / "keras_pendulum" / file_name(Problem.valid(3.5)), damage(pack(right)))
-    assert (episode_values(3.5).roots == right.roots).all()
-    assert len(caplog.records) == 2
-
-
-def test_gravity_out_of_range_is_refused() -> None:
-    with pytest.raises(kp.ConfigError, match=r"^gravity is -1"):
-        episode_values(-1)

@@ -69,15 +69,14 @@ PUBLISHED = {
 
 
 def test_shipped_returns_have_the_published_means(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    optimum_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(module, "best_return", None)  # nothing is computed
     for (gravity, steps, count), (mean, tolerance) in PUBLISHED.items():
         returns = optimal_return(gravity, range(count), steps)
         assert returns.dtype == np.float64 and returns.shape == (count,)
         assert returns.mean() == pytest.approx(mean, abs=tolerance)
-    assert not list(tmp_path.iterdir())
+    assert not optimum_cache.exists()
 
 
 @pytest.mark.parametrize(
@@ -180,7 +179,7 @@ def test_tables_of_shorter_episodes_are_finer_in_the_same_memory(
 
 
 def test_gravities_steps_and_seeds_at_their_limits_are_accepted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    optimum_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls: list[tuple[float, int, int]] = []
 
@@ -188,7 +187,6 @@ def test_gravities_steps_and_seeds_at_their_limits_are_accepted(
         calls.append((gravity, len(starts), steps))
         return np.full(len(starts), -7.0)
 
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(module, "best_return", record)
     for gravity in (0.0, 100.0):
         for steps in (1, 200):
@@ -217,10 +215,7 @@ def test_number_out_of_range_is_refused(change: dict[str, Any], problem: str) ->
         PendulumSolution(Pendulum(values.pop("gravity"))).discounted_returns(**values)
 
 
-def test_seeds_are_accepted_in_any_order_repeated_and_empty(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+def test_seeds_are_accepted_in_any_order_repeated_and_empty(optimum_cache: Path) -> None:
     first = optimal_return(1.0, range(100), 200)
     np.testing.assert_array_equal(optimal_return(), first)
     np.testing.assert_array_equal(optimal_return(1.0, iter([7, 2, 7])), first[[7, 2, 7]])

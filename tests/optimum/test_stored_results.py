@@ -18,12 +18,6 @@ Array = NDArray[np.float64]
 
 
 @pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return tmp_path / "keras_pendulum"
-
-
-@pytest.fixture
 def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Replaces the computation by a fast one; the list has the number of starts of each call."""
     counts: list[int] = []
@@ -56,7 +50,7 @@ def write_returns(path: Path, problem: Problem, returns: dict[int, float]) -> No
 
 
 def test_returns_are_computed_once_and_stored_with_later_seeds(
-    cache: Path, computed: list[int]
+    optimum_cache: Path, computed: list[int]
 ) -> None:
     first = optimal_return(9.81, [3, 2000])
     np.testing.assert_array_equal(optimal_return(9.81, [3, 2000, 999])[:2], first)
@@ -66,14 +60,17 @@ def test_returns_are_computed_once_and_stored_with_later_seeds(
     assert computed == [1001, 1]
     optimal_return(1.0, np.array([5, 10_000]))
     assert computed == [1001, 1, 1]  # the package contains seed 5
-    assert sorted(path.name for path in cache.iterdir()) == ["gravity_1.npz", "gravity_9.81.npz"]
+    assert sorted(path.name for path in optimum_cache.iterdir()) == [
+        "gravity_1.npz",
+        "gravity_9.81.npz",
+    ]
 
 
 def test_file_without_steps_and_discount_is_one_of_200_steps(
-    cache: Path, computed: list[int]
+    optimum_cache: Path, computed: list[int]
 ) -> None:
-    cache.mkdir()
-    (cache / "gravity_9.81.npz").write_bytes(archive())
+    optimum_cache.mkdir()
+    (optimum_cache / "gravity_9.81.npz").write_bytes(archive())
     assert optimal_return(9.81, [4]) == [-7.0]
     assert not computed
 
@@ -133,16 +130,16 @@ def test_file_belongs_to_one_problem(tmp_path: Path) -> None:
     ],
 )
 def test_damaged_or_foreign_cache_is_computed_again_and_replaced(
-    content: bytes, cache: Path, computed: list[int]
+    content: bytes, optimum_cache: Path, computed: list[int]
 ) -> None:
-    cache.mkdir()
-    (cache / "gravity_9.81.npz").write_bytes(content)
+    optimum_cache.mkdir()
+    (optimum_cache / "gravity_9.81.npz").write_bytes(content)
     returns = optimal_return(9.81, range(5))
     assert (returns < -9).all()
     assert computed == [1000]
     np.testing.assert_array_equal(optimal_return(9.81, range(5)), returns)
     assert computed == [1000]
-    assert [path.name for path in cache.iterdir()] == ["gravity_9.81.npz"]
+    assert [path.name for path in optimum_cache.iterdir()] == ["gravity_9.81.npz"]
 
 
 class MakesAFile:
