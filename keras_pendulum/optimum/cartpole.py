@@ -21,9 +21,9 @@ from keras_pendulum.optimum.cartpole_dynamics import (
 from keras_pendulum.optimum.cartpole_values import (
     cartpole_q,
     cartpole_value,
-    greedy_forces,
     highest_value,
     value_at,
+    whole_table,
 )
 from keras_pendulum.optimum.known_dynamics import KnownDynamics, Outcomes, Table
 from keras_pendulum.optimum.solution import Array
@@ -72,7 +72,7 @@ class CartPoleSolution(KnownDynamics):
 
     def table(self, discount: float) -> Table:
         """Returns that of `cartpole_value`."""
-        return cartpole_value(discount)
+        return whole_table(cartpole_value(discount))
 
     def exact_q(self, table: Table, discount: float, states: Array, efforts: Array) -> Array:
         """Returns the Q-values [N, A]."""
@@ -80,7 +80,9 @@ class CartPoleSolution(KnownDynamics):
 
     def greedy_efforts(self, table: Table, discount: float, states: Array) -> Array:
         """Returns the forces [N] in newton."""
-        return greedy_forces(table, states)
+        # V is interpolated without a look ahead. Each discount above 0 gives the same order.
+        q = cartpole_q(table, 1.0, states, lookahead=0)
+        return np.asarray(FORCES[q.argmax(axis=1)])
 
     def best_returns(self, seeds: Iterable[int], steps: int | None = None) -> Array:
         """Returns the number of steps for each seed. Raises ConfigError for one out of range."""

@@ -41,11 +41,11 @@ LOOKAHEAD = 4  # exact steps before V is interpolated: near a fall, the grid is 
 LARGEST_SWEEPS = 1000
 _STRIDES = np.cumprod([1, *SHAPE[:0:-1]])[::-1]
 
-Table = NDArray[np.float32]  # [HALF]: V at the first half of the grid points
+Table = NDArray[np.float32]  # V at the grid points, or [HALF] at the first half of them
 
 
 def cartpole_value(discount: float) -> Table:
-    """Returns V for a discount γ, 0 to 1.
+    """Returns half of V for a discount γ, 0 to 1.
 
     The package has those of the usual ones. Others take about 10 s, and are stored in the user's
     cache folder, if it can be written. Raises ConfigError for a discount out of range.
@@ -87,7 +87,7 @@ def highest_value(discount: float) -> float:
 
 
 def solve_cartpole(discount: float) -> Table:
-    """Returns V for a discount γ by value iteration."""
+    """Returns half of V for a discount γ by value iteration."""
     axes = [np.linspace(-end, end, count) for end, count in zip(ENDS, SHAPE, strict=True)]
     grid = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")], axis=1)[:HALF]
     outcomes = step_forces(grid, FORCES)
@@ -95,7 +95,7 @@ def solve_cartpole(discount: float) -> Table:
     episodic = discount == 1
     value = np.full(HALF, 0 if episodic else highest_value(discount), np.float32)
     for _ in range(CartPole.steps_per_episode if episodic else LARGEST_SWEEPS):
-        whole = _whole(value)
+        whole = whole_table(value)
         following = [
             np.where(outcomes.terminated[:, action], 0, place(whole))
             for action, place in enumerate(places)
@@ -107,48 +107,40 @@ def solve_cartpole(discount: float) -> Table:
 
 
 def cartpole_q(
-    table: Table, discount: float, states: States, forces: NDArray[np.float64] = FORCES
+    table: Table,
+    discount: float,
+    states: States,
+    forces: NDArray[np.float64] = FORCES,
+    lookahead: int = LOOKAHEAD,
 ) -> NDArray[np.float64]:
     """Returns the Q-values [N, A] of the optimum: 1 + γ V(next state).
 
     Args:
-        table: V, from `cartpole_value` for the same discount.
+        table: V, `whole_table` of `cartpole_value` for the same discount.
         discount: γ.
         states: [N, 4].
         forces: N, of the first step, [A]. The later ones are those of V: the better of ±10 N.
+        lookahead: exact steps of V.
     """
-    return _q(_whole(table), discount, states, forces, LOOKAHEAD)
-
-
-def value_at(table: Table, discount: float, states: States) -> NDArray[np.float64]:
-    """Returns V at states [N, 4]; beyond the ends of the grid that of the nearest point."""
-    return _value(_whole(table), discount, states, LOOKAHEAD)
-
-
-def greedy_forces(table: Table, states: States) -> NDArray[np.float64]:
-    """Returns the forces [N] that lead to the higher V, interpolated without a look ahead."""
-    # Any discount above 0 gives the same order.
-    return FORCES[_q(_whole(table), 1.0, states, FORCES, steps=0).argmax(axis=1)]
-
-
-def _value(whole: Table, discount: float, states: States, steps: int) -> NDArray[np.float64]:
-    """Returns V [N]: the best sum of rewards over some exact steps, and V after them."""
-    if not steps:
-        return np.asarray(_Place(states)(whole), np.float64)
-    return np.asarray(_q(whole, discount, states, FORCES, steps - 1).max(axis=1))
-
-
-def _q(
-    whole: Table, discount: float, states: States, forces: NDArray[np.float64], steps: int
-) -> NDArray[np.float64]:
-    """Returns the Q-values [N, A]: the reward of one exact step, and V after it as in `_value`."""
     outcomes = step_forces(states, forces)
-    following = _value(whole, discount, outcomes.state.reshape(-1, 4), steps)
+    following = value_at(table, discount, outcomes.state.reshape(-1, 4), lookahead)
     following = following.reshape(outcomes.reward.shape)
     return outcomes.reward + discount * np.where(outcomes.terminated, 0, following)
 
 
-def _whole(half: Table) -> Table:
+def value_at(
+    table: Table, discount: float, states: States, lookahead: int = LOOKAHEAD
+) -> NDArray[np.float64]:
+    """Returns V at states [N, 4]: the best rewards of some exact steps, and V after them.
+
+    Beyond the ends of the grid it is that of the nearest point.
+    """
+    if not lookahead:
+        return np.asarray(_Place(states)(table), np.float64)
+    return np.asarray(cartpole_q(table, discount, states, FORCES, lookahead - 1).max(axis=1))
+
+
+def whole_table(half: Table) -> Table:
     """Returns V at all grid points, of which the last half mirrors the first."""
     return np.concatenate([half, half[-2::-1]])
 

@@ -29,7 +29,7 @@ EXACT = CartPoleSolution(CartPole())
 
 def visited(seed: int = 0, episodes: int = 40) -> NDArray[np.float64]:
     """Returns states of episodes in which half of the actions are those of the optimum."""
-    random, table = np.random.RandomState(seed), cartpole_value(0.99)
+    random, table = np.random.RandomState(seed), EXACT.table(0.99)
     states = CartPole().starts(range(episodes))
     found = []
     for _ in range(100):
@@ -73,7 +73,7 @@ def test_short_sight_costs_returns() -> None:
 
 @pytest.mark.parametrize("discount", [0.9, 0.99])
 def test_values_are_those_of_long_simulated_play(discount: float) -> None:
-    table, states = cartpole_value(discount), visited()[:1000]
+    table, states = EXACT.table(discount), visited()[:1000]
     values, factor, standing = value_at(table, discount, states), 1.0, np.ones(1000, bool)
     collected = np.zeros(1000)
     while factor > 1e-3:
@@ -90,7 +90,7 @@ def test_values_are_those_of_long_simulated_play(discount: float) -> None:
 
 @pytest.mark.parametrize("discount", SHIPPED)
 def test_q_values_obey_the_optimality_equation(discount: float) -> None:
-    table, states = cartpole_value(discount), visited()[:500]
+    table, states = EXACT.table(discount), visited()[:500]
     q = cartpole_q(table, discount, states)
     if discount == 1:  # a step further, an episode has a step less
         assert (q.max(axis=1) <= 500).all()
@@ -103,7 +103,7 @@ def test_q_values_obey_the_optimality_equation(discount: float) -> None:
 
 
 def test_mirrored_states_have_the_same_values() -> None:
-    table, states = cartpole_value(0.99), visited()[:200]
+    table, states = EXACT.table(0.99), visited()[:200]
     left, right = cartpole_q(table, 0.99, states).T
     mirrored_left, mirrored_right = cartpole_q(table, 0.99, -states).T
     assert left == pytest.approx(mirrored_right, abs=0.01)
