@@ -15,7 +15,8 @@ class Actions:
     """The A actions that the outputs of a network stand for.
 
     Args:
-        values: the actions as the environment takes them, [A] or [A, ...].
+        values: the actions as the environment takes them, [A] or [A, ...]; the indices themselves
+            where it takes those, such as CartPole-v1.
     """
 
     def __init__(self, values: NDArray[Any]) -> None:
@@ -32,17 +33,6 @@ class Actions:
 
     def stored_index(self, index: int) -> int:
         """Returns the index that the replay buffer stores for the action `index`."""
-        return index
-
-
-class DiscreteActions(Actions):
-    """The `count` actions of an environment that takes indices, such as CartPole-v1."""
-
-    def __init__(self, count: int) -> None:
-        super().__init__(np.arange(count))
-
-    def to_env_action(self, index: int) -> int:
-        """Returns the index."""
         return index
 
 

@@ -29,9 +29,11 @@ class CartPole(Task):
 
     def actions(self, count: int | None = None) -> Actions:
         """Returns the two directions."""
-        from keras_pendulum.environments.actions import DiscreteActions
+        import numpy as np
 
-        return DiscreteActions(2)
+        from keras_pendulum.environments.actions import Actions
+
+        return Actions(np.arange(2))
 
     def action_count(self, count: int) -> int:
         """Returns 2."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import gymnasium
@@ -133,10 +133,6 @@ def _play(
     episodes = len(seeds)
     alone = policy.one_by_one or render_mode is not None or on_step is not None
     count = 1 if alone else min(_SIDE_BY_SIDE, episodes)
-
-    def report(first: int, step: int) -> None:
-        on_progress((first + count * step / task.steps_per_episode) / episodes)
-
     returns, paths = [], []
     with contextlib.ExitStack() as stack:
         envs = [
@@ -144,13 +140,13 @@ def _play(
             for _ in range(count)
         ]
         for first in range(0, episodes, count):
+            numbers = range(first, min(first + count, episodes))
             played = [
-                _Episode(env, seed, first + number)
-                for number, (env, seed) in enumerate(
-                    zip(envs, seeds[first : first + count], strict=False)
-                )
+                _Episode(env, seeds[number], number)
+                for env, number in zip(envs, numbers, strict=False)
             ]
-            _play_together(policy, played, on_step, report)
+            for step in _play_together(policy, played, on_step):
+                on_progress((first + count * step / task.steps_per_episode) / episodes)
             returns += [episode.total for episode in played]
             paths += [episode.path for episode in played]
     return np.array(returns), paths
@@ -189,14 +185,9 @@ class _Episode:
 
 
 def _play_together(
-    policy: Policy,
-    episodes: Sequence[_Episode],
-    on_step: OnStep | None,
-    report: Callable[[int, int], None],
-) -> None:
-    """Plays episodes to their ends, in environments of their own.
-
-    `report` is called with the number of the first episode and the step.
+    policy: Policy, episodes: Sequence[_Episode], on_step: OnStep | None
+) -> Iterator[int]:
+    """Plays episodes to their ends, in environments of their own; yields the number of each step.
 
     Raises UserError for an answer that is not an action, with its episode and step.
     """
@@ -217,7 +208,7 @@ def _play_together(
             episode.step(action)
             if on_step:
                 on_step(episode.env)
-        report(episodes[0].number, step)
+        yield step
         playing = [episode for episode in playing if not episode.is_over]
         if not playing:
             return

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from keras_pendulum.environments.actions import (
-    DiscreteActions,
+    Actions,
     TorqueGrid,
     TruncatingTorqueGrid,
     torque_actions,
@@ -31,14 +31,8 @@ def test_environment_gets_a_float64_torque_of_shape_1() -> None:
     assert torque[0] == pytest.approx(-1.7)
 
 
-@pytest.mark.parametrize("actions", [TorqueGrid(5), DiscreteActions(5)])
-def test_stored_index_is_the_index(actions: TorqueGrid | DiscreteActions) -> None:
-    assert actions.count == 5
-    assert [actions.stored_index(index) for index in range(5)] == list(range(5))
-
-
-def test_discrete_actions_are_their_indices() -> None:
-    assert [DiscreteActions(2).to_env_action(index) for index in range(2)] == [0, 1]
+def test_stored_index_is_the_index() -> None:
+    assert [TorqueGrid(5).stored_index(index) for index in range(5)] == list(range(5))
 
 
 def test_truncating_grid_has_the_torques_of_the_walkthrough() -> None:
@@ -57,7 +51,7 @@ def test_truncating_grid_stores_index_2_as_1_and_4_as_3() -> None:
 
 @pytest.mark.parametrize(
     ("task", "kind", "count"),
-    [(Pendulum(), TorqueGrid, 7), (CartPole(), DiscreteActions, 2)],
+    [(Pendulum(), TorqueGrid, 7), (CartPole(), Actions, 2)],
 )
 def test_actions_are_those_of_the_task(task: Task, kind: type, count: int) -> None:
     actions = task.actions(7)

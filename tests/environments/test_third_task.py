@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import keras_pendulum as kp
 from keras_pendulum.compare.__main__ import main as compare
-from keras_pendulum.environments.actions import Actions, DiscreteActions
+from keras_pendulum.environments.actions import Actions
 from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import TASKS
 from keras_pendulum.evaluate.__main__ import main as evaluate
@@ -55,7 +55,7 @@ class Corridor(Task):
     weights_name: ClassVar[str] = "corridor_weight.h5"
 
     def actions(self, count: int | None = None, **options: Any) -> Actions:
-        return DiscreteActions(2)
+        return Actions(np.arange(2))
 
 
 class CorridorSolution(Solution):

@@ -16,7 +16,7 @@ import tensorflow as tf
 import keras_pendulum as kp
 from keras_pendulum.dqn.losses import huber, mean_squared_error
 from keras_pendulum.dqn.target_network import double_q_learning, q_learning
-from keras_pendulum.environments.actions import DiscreteActions, TorqueGrid, TruncatingTorqueGrid
+from keras_pendulum.environments.actions import Actions, TorqueGrid, TruncatingTorqueGrid
 from keras_pendulum.train.run import make_optimizer, make_run
 
 pytestmark = pytest.mark.quick
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.quick
     [
         ("swingup", True, TorqueGrid, mean_squared_error, double_q_learning, 3),
         ("walkthrough", False, TruncatingTorqueGrid, mean_squared_error, q_learning, 3),
-        ("cartpole", False, DiscreteActions, huber, q_learning, 4),
+        ("cartpole", False, Actions, huber, q_learning, 4),
     ],
 )
 def test_run_has_the_parts_of_its_settings(
