@@ -321,12 +321,6 @@ def test_function_that_gives_no_q_values_is_refused_at_once(function: Any, probl
         kp.q_function(function)
 
 
-def test_q_values_that_are_not_finite_choose_no_action() -> None:
-    policy = kp.q_function(lambda observations: observations * np.nan)
-    with pytest.raises(kp.UserError, match=r"episode 0, step 0: .* Q-value that is not finite"):
-        kp.evaluate_policy(policy, 1, gravity=1.0)
-
-
 def test_q_function_needs_a_function() -> None:
     with pytest.raises(TypeError, match=r"^function is 3; expected a function"):
         kp.q_function(3)  # type: ignore[arg-type]
@@ -341,20 +335,13 @@ def test_row_of_a_wrong_answer_is_known() -> None:
     assert caught.value.row == 6
 
 
+@pytest.mark.parametrize("kind", [object, torch.nn.Module])
 @pytest.mark.parametrize(
     "method", ["act", "choose_action", "select_action", "get_action", "predict"]
 )
-def test_object_that_chooses_an_action_is_an_agent(method: str) -> None:
-    agent = as_policy(type("Agent", (), {method: lambda self, observation: 1.5})())
+def test_object_that_chooses_an_action_is_an_agent(method: str, kind: type) -> None:
+    agent = as_policy(type("Agent", (kind,), {method: lambda self, observation: 1.5})())
     np.testing.assert_array_equal(agent.act(OBSERVATIONS), np.full((9, 1), 1.5))
-
-
-def test_keras_model_of_one_row_gets_one_row(network: kp.DQN) -> None:
-    model = keras.Sequential([keras.Input((1, 3)), keras.layers.Flatten(), keras.layers.Dense(5)])
-    rows = np.eye(3, dtype=np.float32)
-    policy = as_policy(model)
-    assert policy.q_values(rows) == pytest.approx(model(rows[:, None]).numpy())
-    assert kp.evaluate_policy(model, 1, gravity=1.0).regret > 0
 
 
 def test_model_of_a_class_of_ones_own_is_not_compiled() -> None:
@@ -414,11 +401,3 @@ def test_model_gets_the_observations_with_which_it_learned() -> None:
 
     policy = as_policy(Normalized())
     assert policy.act(np.array([[1, 0, 0]], np.float32)).item() == pytest.approx(0.1)
-
-
-def test_pytorch_module_with_a_method_of_an_agent_is_one() -> None:
-    class Actor(torch.nn.Module):
-        def act(self, observation: Any) -> float:
-            return 1.5
-
-    assert as_policy(Actor()).act(OBSERVATIONS).tolist() == [[1.5]] * len(OBSERVATIONS)
