@@ -18,21 +18,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
+ROW = 2.4  # inches, height of a panel
+BETWEEN = 0.95  # two rows: the names and numbers of an axis, and the title of the next one
 
-def draw_planes(
-    figure: Figure, place: SubplotSpec, planes: Mapping[str, PhasePlane], between: float
-) -> None:
+
+def draw_planes(figure: Figure, place: SubplotSpec, planes: Mapping[str, PhasePlane]) -> None:
     """Draws one column for each phase plane; the planes of a row have one scale.
 
     Args:
         figure: to draw on.
         place: in the figure.
         planes: at least one, by name; all of one task.
-        between: the space between the two rows, as a share of a row's height.
     """
     from matplotlib.colors import LinearSegmentedColormap
 
-    grid = place.subgridspec(2, len(planes), wspace=0.34, hspace=between)
+    grid = place.subgridspec(2, len(planes), wspace=0.34, hspace=BETWEEN / ROW)
     panels = [
         [figure.add_subplot(grid[row, column], title=name) for column, name in enumerate(planes)]
         for row in range(2)

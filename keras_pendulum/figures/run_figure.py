@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from keras_pendulum.figures.learning_curve import CURVE, draw_episode_axis, draw_learning_curve
-from keras_pendulum.figures.phase_planes import draw_planes
+from keras_pendulum.figures.phase_planes import BETWEEN, ROW, draw_planes
 from keras_pendulum.figures.regrets import scale_greedy_regrets
 from keras_pendulum.figures.style import own_style, png
 from keras_pendulum.optimum.phase_plane import PhasePlane
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 _WIDTH = 9.6  # inches, as all that follow
 _LIVE_HEIGHT = 5.4
-_ROW = 2.4  # height of a panel
-_BETWEEN = 0.95  # two rows: the names and numbers of an axis, and the title of the next one
 _LEGEND = 0.5  # two lines, above the first row
 _TITLE = 0.8
 _SMALLEST_DECIMAL = 1e-4  # of the numbers at an axis
@@ -49,7 +47,6 @@ def draw_run(
         planes: phase planes to draw side by side, by name; may be empty.
         title: of the figure; its first line is the larger one.
     """
-
     evaluated = [record for record in history if not math.isnan(record.greedy_regret)]
     row = 2 if evaluated else 1  # of ε and loss
     rows = row + (3 if planes else 1)
@@ -66,7 +63,7 @@ def draw_run(
             _draw_greedy_regret(axes, evaluated)
             draw_episode_axis(axes, len(history))
         if planes:
-            draw_planes(figure, grid[row + 1 :, :], planes, _BETWEEN / _ROW)
+            draw_planes(figure, grid[row + 1 :, :], planes)
         return png(figure)
 
 
@@ -100,10 +97,9 @@ def draw_live(
 
 def draw_phase_planes(planes: Mapping[str, PhasePlane]) -> bytes:
     """Returns a PNG with greedy efforts and values, one column for each phase plane."""
-
     with own_style():
         figure, grid = _figure_with_grid(2, 1, top=0.5)
-        draw_planes(figure, grid[:, 0], planes, _BETWEEN / _ROW)
+        draw_planes(figure, grid[:, 0], planes)
         return png(figure)
 
 
@@ -115,7 +111,7 @@ def _figure_with_grid(rows: int, columns: int, top: float) -> tuple[Figure, Grid
     from matplotlib.figure import Figure
 
     bottom = 0.65
-    height = top + rows * _ROW + (rows - 1) * _BETWEEN + bottom
+    height = top + rows * ROW + (rows - 1) * BETWEEN + bottom
     figure = Figure(figsize=(_WIDTH, height))
     grid = figure.add_gridspec(
         rows,
@@ -125,7 +121,7 @@ def _figure_with_grid(rows: int, columns: int, top: float) -> tuple[Figure, Grid
         bottom=bottom / height,
         top=1 - top / height,
         wspace=0.38,
-        hspace=_BETWEEN / _ROW,
+        hspace=BETWEEN / ROW,
     )
     return figure, grid
 

@@ -193,14 +193,3 @@ def test_gravity_is_the_given_one_else_the_recorded_one(
     assert score.optimal_returns == [gravity]
     alone = kp.evaluate_policy(kp.DQN((8,)), 1, gravity=gravity)
     assert alone.returns == score.returns
-
-
-def test_cartpole_has_an_optimum_of_500_and_no_gravity() -> None:
-    network = kp.DQN((8,), 2, observation_size=4, metadata={"environment": "CartPole-v1"})
-    score = kp.evaluate_policy(network, 3)
-    assert score.optimal_returns.tolist() == [500.0] * 3
-    values = score.as_json()
-    assert (values["environment"], values["gravity"]) == ("CartPole-v1", None)
-    assert values["discount_regret"] is values["learning_regret"] is None
-    with pytest.raises(kp.ConfigError, match=r"^gravity belongs to Pendulum-v1; CartPole-v1 has"):
-        kp.evaluate_policy(network, 1, gravity=0.0)
