@@ -21,7 +21,6 @@ class CartPoleScene(Scene):
     directions: ClassVar[tuple[str, str]] = ("left", "right")
     return_digits: ClassVar[int] = 0
     angles: ClassVar[dict[float, str]] = {-LARGEST_ANGLE: "−12°", 0: "0°", LARGEST_ANGLE: "12°"}
-    speeds: ClassVar[tuple[float, ...]] = (-3, -1.5, 0, 1.5, 3)
 
     def draw(
         self, observation: Observation, effort: float, size: tuple[int, int]

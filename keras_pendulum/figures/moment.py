@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pygame
 
 from keras_pendulum.figures.drawing import INK, LARGE, LINE, PALE_INK, PAPER, ROD, WHITE, Writer
@@ -114,13 +115,13 @@ def draw_portrait(
     Args:
         writer: has the surface to draw on.
         place: the rectangle for the portrait and its labels.
-        scene: has the limits of the axes.
+        scene: has the dynamics, with the limits of the axes, and the labels.
         path: of the episode so far, dark; its last state is a dot.
         earlier: of another episode, pale.
     """
     screen, write = writer.screen, writer.write
     frame = pygame.Rect(place.left + 66, place.top + 30, place.width - 90, place.height - 96)
-    largest = max(scene.angles), max(scene.speeds)
+    largest = scene.dynamics.phase_ends
 
     def pixel(state: tuple[float, float]) -> pygame.Vector2:
         x, y = (value / end for value, end in zip(state, largest, strict=True))
@@ -133,7 +134,7 @@ def draw_portrait(
         x = pixel((angle, 0.0)).x
         pygame.draw.line(plane, PAPER, (_FINE * x, 0), (_FINE * x, plane.get_height()), 2 * _FINE)
         write(name, (frame.left + round(x), frame.bottom + 6), align=0.5, color=PALE_INK)
-    for speed in scene.speeds:
+    for speed in np.linspace(-largest[1], largest[1], 5):
         y = pixel((0.0, speed)).y
         pygame.draw.line(plane, PAPER, (0, _FINE * y), (plane.get_width(), _FINE * y), 2 * _FINE)
         label = (frame.left - 8, frame.top + round(y) - 8)

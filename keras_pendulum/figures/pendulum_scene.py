@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import pygame
 
-from keras_pendulum.environments.pendulum import MAX_SPEED, MAX_TORQUE
+from keras_pendulum.environments.pendulum import MAX_TORQUE
 from keras_pendulum.figures.drawing import INK, PAPER, ROD, WHITE
 from keras_pendulum.figures.scene import Observation, Scene
 from keras_pendulum.figures.style import torque_color
@@ -20,7 +20,6 @@ class PendulumScene(Scene):
     directions: ClassVar[tuple[str, str]] = ("clockwise", "counterclockwise")
     return_digits: ClassVar[int] = 1
     angles: ClassVar[dict[float, str]] = {-math.pi: "−180°", 0: "0° (upright)", math.pi: "180°"}
-    speeds: ClassVar[tuple[float, ...]] = (-MAX_SPEED, -4, 0, 4, MAX_SPEED)
 
     def draw(
         self, observation: Observation, effort: float, size: tuple[int, int]

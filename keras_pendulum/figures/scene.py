@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -23,9 +22,7 @@ class Scene(ABC):
 
     directions: ClassVar[tuple[str, str]]  # of a negative and of a positive effort
     return_digits: ClassVar[int]  # after the decimal point
-    # The phase portrait: θ in rad over θ̇ in rad/s, with labels at these places.
-    angles: ClassVar[dict[float, str]]
-    speeds: ClassVar[Sequence[float]]
+    angles: ClassVar[dict[float, str]]  # labels of θ in rad, in the phase portrait
 
     def __init__(self, task: Task) -> None:
         self.task, self.dynamics = task, known_dynamics(task)

@@ -64,13 +64,6 @@ def test_presets_are_listed_under_their_own_names() -> None:
     assert list(DESCRIPTIONS) == list(PRESETS)
 
 
-def test_changed_settings_leave_the_others_as_they_are() -> None:
-    config = kp.preset("original", seed=3, episodes=200)
-    assert (config.seed, config.episodes, config.preset) == (3, 200, "original")
-    assert config.replay_capacity == 8000
-    assert kp.preset("original").episodes == 500
-
-
 @pytest.mark.parametrize("name", ["nonsense", "", "Reference"])
 def test_unknown_preset_is_refused_with_the_names_of_the_presets(name: str) -> None:
     with pytest.raises(kp.ConfigError, match=f"^unknown preset '{name}'.*reference, original"):

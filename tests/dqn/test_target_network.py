@@ -7,7 +7,7 @@ import pytest
 import tensorflow as tf
 
 from keras_pendulum.dqn.network import DQN
-from keras_pendulum.dqn.target_network import hard_update, no_update, soft_update
+from keras_pendulum.dqn.target_network import hard_update, soft_update
 
 
 def filled(value: float) -> DQN:
@@ -39,10 +39,3 @@ def test_hard_update_copies_at_every_period() -> None:
         online.set_weights(filled(step).get_weights())
         hard_update(3, online, target, tf.constant(step, tf.int64))
         assert_filled(target, value)
-
-
-def test_no_update_changes_nothing() -> None:
-    online, target = filled(8.0), filled(0.0)
-    no_update(online, target, tf.constant(1))
-    assert_filled(online, 8.0)
-    assert_filled(target, 0.0)

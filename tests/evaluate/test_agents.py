@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -151,14 +150,6 @@ def test_every_kind_of_agent_has_the_returns_of_the_network(kind: str, network: 
         np.testing.assert_array_equal(torques_of(agent), GRID)
     score, expected = (kp.evaluate_policy(each, 3) for each in (source, network))
     np.testing.assert_allclose(score.returns, expected.returns, rtol=1e-9)
-
-
-def test_file_of_keras_is_the_model(network: kp.DQN, tmp_path: Path) -> None:
-    path = tmp_path / "mine.keras"
-    dense_chain(network).save(path)
-    agent = as_policy(path, torques=-GRID)
-    np.testing.assert_array_equal(agent.act(OBSERVATIONS), -as_policy(network).act(OBSERVATIONS))
-    assert agent.name == str(path)
 
 
 def test_network_without_weights_is_refused() -> None:

@@ -16,6 +16,7 @@ import torch
 from conftest import Command
 
 import keras_pendulum as kp
+from keras_pendulum.evaluate.sources import as_policy
 
 CARTPOLE = "CartPole-v1"
 
@@ -95,6 +96,7 @@ def test_file_of_a_keras_model_with_other_layers_is_one_of_cartpole(tmp_path: Pa
     layers = [keras.layers.Dense(8), keras.layers.LayerNormalization(), keras.layers.Dense(2)]
     keras.Sequential([keras.Input((4,)), *layers]).save(path)
     assert kp.evaluate_policy(path, 2).environment == CARTPOLE
+    assert as_policy(path).name == str(path)
 
 
 @pytest.mark.parametrize("outputs", [3, 5])

@@ -24,6 +24,11 @@ tf_keras = pytest.importorskip("tf_keras")
 OBSERVATIONS = np.random.RandomState(0).normal(size=(4, 3)).astype(np.float32)
 
 
+def require_refused(path: Path, message: str) -> None:
+    with pytest.raises(kp.WeightsError, match=message):
+        named_policy(str(path))
+
+
 class YourNetwork(torch.nn.Module):
     def __init__(self) -> None:
         super().__init__()
@@ -101,16 +106,14 @@ def test_layers_that_are_never_called_change_nothing(library: Any, tmp_path: Pat
 def test_weights_alone_of_other_layers_are_refused(name: str, tmp_path: Path) -> None:
     path = tmp_path / "model.weights.h5"
     MODELS[name](keras).save_weights(path)
-    with pytest.raises(kp.WeightsError, match=r"weights alone.*model\.save.*give mine\.py:agent"):
-        named_policy(str(path))
+    require_refused(path, r"weights alone.*model\.save.*give mine\.py:agent")
 
 
 def test_code_in_a_model_is_refused(tmp_path: Path) -> None:
     model = sequential(keras, layers.Dense(8), layers.Lambda(lambda x: x))
     for library_path in (tmp_path / "model.h5", tmp_path / "model.keras"):
         model.save(library_path)
-        with pytest.raises(kp.WeightsError, match=r"is a Lambda; .*give file\.py:name"):
-            named_policy(str(library_path))
+        require_refused(library_path, r"is a Lambda; .*give file\.py:name")
 
 
 def test_module_of_a_layer_in_h5_is_checked(tmp_path: Path) -> None:
@@ -123,8 +126,7 @@ def test_module_of_a_layer_in_h5_is_checked(tmp_path: Path) -> None:
         config = json.loads(file.attrs["model_config"])
         config["config"]["layers"][2] |= {"module": "antigravity", "registered_name": None}
         file.attrs["model_config"] = json.dumps(config)
-    with pytest.raises(kp.WeightsError, match="is a LeakyReLU; expected Keras's own layers"):
-        named_policy(str(path))
+    require_refused(path, "is a LeakyReLU; expected Keras's own layers")
 
 
 def save_torch(path: Path) -> None:
@@ -223,26 +225,22 @@ def test_model_of_stable_baselines_is_loaded_by_it(
         archive.writestr("data", text)
         archive.writestr("policy.pth", b"")
     code = f"from stable_baselines3 import {algorithm}; agent = {algorithm}.load('{path}')"
-    with pytest.raises(kp.WeightsError, match=re.escape(code)):
-        named_policy(str(path))
+    require_refused(path, re.escape(code))
 
 
 def test_arrays_and_records_are_told_apart(tmp_path: Path) -> None:
     arrays, record = tmp_path / "w.npz", tmp_path / "run.npz"
     np.savez(arrays, w=np.zeros(3))
-    with pytest.raises(kp.WeightsError, match="a file of NumPy arrays"):
-        named_policy(str(arrays))
+    require_refused(arrays, "a file of NumPy arrays")
     np.savez(record, observation=np.zeros(3), total=0)
-    with pytest.raises(kp.WeightsError, match=r"a record of a training; .*--record"):
-        named_policy(str(record))
+    require_refused(record, r"a record of a training; .*--record")
 
 
 def test_long_path_leaves_the_code_whole(tmp_path: Path) -> None:
     path = tmp_path / ("long" * 40) / "net.pth"
     path.parent.mkdir()
     save_torch(path)
-    with pytest.raises(kp.WeightsError, match=r"torch\.load\('net\.pth', weights_only=True\)"):
-        named_policy(str(path))
+    require_refused(path, r"torch\.load\('net\.pth', weights_only=True\)")
 
 
 def test_model_of_a_class_of_ones_own_is_read_with_a_warning(tmp_path: Path) -> None:

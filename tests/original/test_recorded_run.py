@@ -6,8 +6,8 @@ Both were recorded under Keras 2.15, with every random number seeded by 1.
 from __future__ import annotations
 
 import platform
-import random
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,45 +32,27 @@ WARMUP_EPISODES = 41
 ORIGINAL_LINES = printed_lines("original_run_seed1")
 
 
-class ReplaySpy(random.Random):
-    """A seeded generator that records the step numbers of each batch."""
-
-    def __init__(self, run: Run) -> None:
-        super().__init__(run.config.seed)
-        self.run = run
-        self.batches: list[list[int]] = []
-
-    def sample(self, population: Any, k: int, **options: Any) -> Any:
-        positions = super().sample(population, k, **options)
-        oldest = self.run.replay.added - len(population)
-        self.batches.append([oldest + position for position in positions])
-        return positions
+class Exploration(np.random.RandomState):
+    """A generator whose methods can be replaced, unlike those of NumPy's own class."""
 
 
-class ExplorationSpy(np.random.RandomState):
-    """A seeded generator that records the step numbers of random actions."""
+def record_calls(owner: Any, method: str, note: Callable[..., Any]) -> list[Any]:
+    """Returns a list to which each call adds `note` of its result and its arguments."""
+    notes: list[Any] = []
+    original = getattr(owner, method)
 
-    def __init__(self, run: Run) -> None:
-        super().__init__(run.config.seed)
-        self.run = run
-        self.steps: list[int] = []
+    def recording(*arguments: Any) -> Any:
+        result = original(*arguments)
+        notes.append(note(result, *arguments))
+        return result
 
-    def randint(self, *arguments: Any, **options: Any) -> Any:
-        self.steps.append(self.run.replay.added)
-        return super().randint(*arguments, **options)
+    setattr(owner, method, recording)
+    return notes
 
 
 def record_actions(run: Run) -> list[Any]:
     """Returns a list to which the run adds each action as the environment takes it."""
-    taken: list[Any] = []
-    to_env_action = run.actions.to_env_action
-
-    def recording(index: int) -> Any:
-        taken.append(to_env_action(index))
-        return taken[-1]
-
-    run.actions.to_env_action = recording  # type: ignore[method-assign]
-    return taken
+    return record_calls(run.actions, "to_env_action", lambda action, index: action)
 
 
 def run_from(recorded: Recorded, preset: str, **changes: Any) -> Run:
@@ -93,8 +75,14 @@ def require_same_history(run: Run, recorded: Recorded, lines: list[str]) -> None
 def test_original_repeats_its_first_100_episodes(recorded: Recorded) -> None:
     run = run_from(recorded, "original", episodes=STRICT_EPISODES)
     actions = record_actions(run)
-    run.streams.replay = replay = ReplaySpy(run)
-    run.agent.rng = exploration = ExplorationSpy(run)
+    run.agent.rng = Exploration(run.config.seed)
+    # The numbers of the steps with random actions, and those of the steps of each batch.
+    explored = record_calls(run.agent.rng, "randint", lambda *_: run.replay.added)
+    batches = record_calls(
+        run.streams.replay,
+        "sample",
+        lambda positions, stored, _: np.add(positions, run.replay.added - len(stored)),
+    )
 
     list(train_episodes(run))
 
@@ -102,9 +90,9 @@ def test_original_repeats_its_first_100_episodes(recorded: Recorded) -> None:
     updates = STRICT_EPISODES - WARMUP_EPISODES
     torques = np.linspace(-2, 2, 41)[recorded["action_index"][:steps]]
     np.testing.assert_array_equal(np.concatenate(actions), torques)
-    explored = np.flatnonzero(np.unpackbits(recorded["explored"])[:steps])
-    np.testing.assert_array_equal(exploration.steps, explored)
-    np.testing.assert_array_equal(replay.batches, recorded["batch"][:updates])
+    expected = np.flatnonzero(np.unpackbits(recorded["explored"])[:steps])
+    np.testing.assert_array_equal(explored, expected)
+    np.testing.assert_array_equal(batches, recorded["batch"][:updates])
     require_same_history(run, recorded, ORIGINAL_LINES)
     losses = [record.loss for record in run.history[WARMUP_EPISODES:]]
     np.testing.assert_allclose(losses, recorded["loss"][:updates], rtol=1e-5)
