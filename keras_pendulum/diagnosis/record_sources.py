@@ -14,8 +14,8 @@ from keras_pendulum.diagnosis.recorded_steps import Steps, read_steps
 from keras_pendulum.diagnosis.recorder import Recorder, VectorRecorder
 from keras_pendulum.diagnosis.signals import nearest
 from keras_pendulum.dqn.replay_buffer import Transitions
-from keras_pendulum.environments.pendulum import MAX_TORQUE
 from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError, UserError
 from keras_pendulum.evaluate.answers import plain_array
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from keras_pendulum.environments.pendulum import MAX_TORQUE, ROUNDING
+from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING
 from keras_pendulum.errors import ConfigError
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from keras_pendulum.environments.task import Task
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from keras_pendulum.environments.actions import TorqueGrid
 
 STEPS_PER_EPISODE = 200
-MAX_TORQUE = 2.0  # N·m
-ROUNDING = 1e-5  # N·m; a larger excess over MAX_TORQUE is not one of float32
 MAX_SPEED = 8.0  # rad/s
 LARGEST_GRAVITY = 100.0  # m/s²
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import MAX_TORQUE, ROUNDING
+from keras_pendulum.environments.torque import MAX_TORQUE, ROUNDING
 from keras_pendulum.errors import UserError, reason_of
 
 _ONE_OUTPUT = (

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from keras_pendulum.environments.actions import torque_actions
 from keras_pendulum.environments.cartpole import CartPole
-from keras_pendulum.environments.pendulum import MAX_TORQUE
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.answers import (
     ActionError,

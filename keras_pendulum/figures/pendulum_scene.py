@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import pygame
 
-from keras_pendulum.environments.pendulum import MAX_TORQUE
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.figures.drawing import INK, PAPER, ROD, WHITE
 from keras_pendulum.figures.scene import Observation, Scene
 from keras_pendulum.figures.style import torque_color

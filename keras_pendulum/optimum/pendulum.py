@@ -17,12 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.fields import SEED
-from keras_pendulum.environments.pendulum import (
-    MAX_SPEED,
-    MAX_TORQUE,
-    STEPS_PER_EPISODE,
-    Pendulum,
-)
+from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE, Pendulum
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.optimum.best_return import best_return, compute_returns
 from keras_pendulum.optimum.discounted import discounted_value
 from keras_pendulum.optimum.dynamics import TORQUES, simulate_return, step_all_torques

@@ -21,7 +21,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.environments.pendulum import MAX_SPEED, MAX_TORQUE, STEPS_PER_EPISODE
+from keras_pendulum.environments.pendulum import MAX_SPEED, STEPS_PER_EPISODE
+from keras_pendulum.environments.torque import MAX_TORQUE
 from keras_pendulum.optimum.dynamics import (
     TIME_STEP,
     TORQUES,
