@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.signals import Array, Fit, advantages, line_fit
-from keras_pendulum.diagnosis.states import observation_changes
+from keras_pendulum.diagnosis.signals import Array, Fit, advantage_fit, advantages, line_fit
 from keras_pendulum.environments.pendulum import MAX_SPEED
-from keras_pendulum.environments.task import Task
-from keras_pendulum.optimum.known_dynamics import KnownDynamics, Outcomes
 
 
 class Backup(NamedTuple):
@@ -105,7 +100,7 @@ class Backup(NamedTuple):
         future = self.future * self.next_q.max(axis=2)
         line = line_fit(self.q - future, self.reward)
         target = line.slope * self.reward + line.offset + future
-        correlation = line_fit(advantages(self.q), advantages(target)).correlation
+        correlation = advantage_fit(self.q, target).correlation
         return line._replace(correlation=correlation)
 
     @property
@@ -113,66 +108,6 @@ class Backup(NamedTuple):
         """The factor on the rewards with which the values obey the right equation best."""
         rest = self.q - self.future * self.next_q.max(axis=2)
         return float((rest * self.reward).sum() / max((self.reward**2).sum(), 1e-12))
-
-
-@dataclass(frozen=True)
-class Visited:
-    """A network at the states that it visits, and its declared task."""
-
-    q_values: Callable[[NDArray[np.float32]], Array]  # from observations [B, D] to [B, A]
-    states: Array  # [N, S]
-    efforts: Array  # of the outputs, [A]
-    dynamics: KnownDynamics
-    discount: float  # γ
-    reward_scale: float = 1.0  # as in `Backup`
-
-    def backup(
-        self,
-        task: Task | None = None,
-        efforts: Array | None = None,
-        observation: str | None = None,
-        steps: int = 1,
-    ) -> Backup:
-        """Returns the values at the states and at all that can follow.
-
-        Args:
-            task: in place of the declared one.
-            efforts: of the outputs [A], in place of the declared ones.
-            observation: one of `observation_changes`, made before the network sees the observation.
-            steps: for which each action lasts; then the reward is the sum of theirs.
-        """
-        dynamics, states = self.dynamics, self.states
-        if task is not None:
-            dynamics = type(dynamics)(task)
-        change = np.eye(len(dynamics.observation_sizes), dtype=np.float32)
-        if observation is not None:
-            change = observation_changes(dynamics)[observation]
-        if observation is not None or steps > 1:  # many are tried: a quarter is enough
-            states = states[::4]
-        efforts = self.efforts if efforts is None else efforts
-        outcomes = dynamics.outcomes(states, efforts)
-        for _ in range(steps - 1):
-            outcomes = _with_another_step(dynamics, outcomes, efforts)
-        following = outcomes.state.reshape(-1, states.shape[1])
-        next_observation: NDArray[np.float32] = dynamics.observe(following) @ change
-        next_q = self.q_values(next_observation).reshape(*outcomes.reward.shape, -1)
-        q = self.q_values(dynamics.observe(states) @ change)
-        reward, ended = outcomes.reward, outcomes.terminated
-        if ended.any():  # many programs give the last step a penalty, which is no mistake
-            reward = np.where(ended, min(float(reward.mean()), float(q[ended].mean())), reward)
-        return Backup(q, reward, next_q, self.discount, next_observation, ~ended, self.reward_scale)
-
-
-def _with_another_step(dynamics: KnownDynamics, outcomes: Outcomes, efforts: Array) -> Outcomes:
-    """Returns the outcomes after one more step with the same efforts [A]."""
-    reward, state, ended = outcomes
-    count = len(state)
-    again = dynamics.outcomes(state.reshape(reward.size, -1), np.tile(efforts, count)[:, None])
-    return Outcomes(
-        reward + np.where(ended, 0, again.reward.reshape(reward.shape)),
-        np.where(ended[..., None], state, again.state.reshape(state.shape)),
-        ended | again.terminated.reshape(ended.shape),
-    )
 
 
 class Agreement(NamedTuple):
@@ -193,7 +128,7 @@ def agreement(values: Backup, target: Array) -> Agreement:
     way, error = target - values.right, values.q - values.right
     return Agreement(
         float(np.sqrt(np.mean((values.q - target) ** 2)) / values.spread),
-        line_fit(advantages(values.q), advantages(target)).correlation,
+        advantage_fit(values.q, target).correlation,
         float(learned / max(right, 1e-12)),
         float((way * error).sum() / max((way**2).sum(), 1e-12)),
         float(values.q.mean()),

@@ -34,7 +34,7 @@ class Equation:
     flat: float = 0.0  # above 0: the advantages of Q are at most this share of the right ones
     like_short_training: bool = False  # whether right values that have not converged look like it
     offset: bool = False  # whether it has no next values, and Q - r is as it says
-    change: dict[str, Any] | None = None  # arguments of `Visited.backup`
+    change: dict[str, Any] | None = None  # arguments of `changed_backup`
     label: str = ""  # what differs from the declared task
     discount: float | None = None  # γ, where it differs
     slope: float | None = None  # of the values over the exact ones, where it says one

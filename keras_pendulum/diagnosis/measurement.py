@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from keras_pendulum.diagnosis import signals
-from keras_pendulum.diagnosis.backup import Agreement, Backup, Visited, agreement
+from keras_pendulum.diagnosis.backup import Agreement, Backup, agreement
 from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.equations import agreements
 from keras_pendulum.diagnosis.played_agent import PlayedAgent, no_report
 from keras_pendulum.diagnosis.signals import Array, Fit
-from keras_pendulum.diagnosis.states import visited_states
+from keras_pendulum.diagnosis.states import observation_changes, visited_states
+from keras_pendulum.environments.task import Task
 from keras_pendulum.evaluate.policy import Observations
 
 
@@ -35,8 +36,7 @@ class Measurement(PlayedAgent):
         """Returns a copy whose policy has no part that pickle refuses, such as a local function."""
         copied, policy = copy.copy(self), copy.copy(self.policy)
         vars(copied)["on_episodes"] = no_report
-        for name in ("visited", "agreements"):  # they hold functions
-            vars(copied).pop(name, None)
+        vars(copied).pop("agreements", None)  # they hold functions
         for name, value in vars(policy).items():
             try:
                 pickle.dumps(value)
@@ -58,17 +58,48 @@ class Measurement(PlayedAgent):
         return q / self.reward_scale
 
     @cached_property
-    def visited(self) -> Visited:
-        """The network at the states that it visits itself, with random actions."""
-        states = visited_states(self.q_values, self.efforts, self.dynamics, self.starts)
-        return Visited(
-            self.q_values, states, self.efforts, self.dynamics, self.discount, self.reward_scale
-        )
+    def visited_states(self) -> Array:
+        """The states [N, S] that the network visits itself, with random actions."""
+        return visited_states(self.q_values, self.efforts, self.dynamics, self.starts)
 
     @cached_property
     def backup(self) -> Backup:
-        """The values at `visited`, and at all states that can follow, of the declared task."""
-        return self.visited.backup()
+        """The values at `visited_states`, and at all that can follow, of the declared task."""
+        return self.changed_backup()
+
+    def changed_backup(
+        self,
+        task: Task | None = None,
+        efforts: Array | None = None,
+        observation: str | None = None,
+        steps: int = 1,
+    ) -> Backup:
+        """Returns the values at `visited_states`, and at all states that can follow.
+
+        Args:
+            task: in place of the declared one.
+            efforts: of the outputs [A], in place of the declared ones.
+            observation: one of `observation_changes`, made before the network sees the observation.
+            steps: for which each action lasts; then the reward is the sum of theirs.
+        """
+        dynamics, states = self.dynamics, self.visited_states
+        if task is not None:
+            dynamics = type(dynamics)(task)
+        change = np.eye(len(dynamics.observation_sizes), dtype=np.float32)
+        if observation is not None:
+            change = observation_changes(dynamics)[observation]
+        if observation is not None or steps > 1:  # many are tried: a quarter is enough
+            states = states[::4]
+        efforts = self.efforts if efforts is None else efforts
+        outcomes = dynamics.lasting_outcomes(states, efforts, steps)
+        following = outcomes.state.reshape(-1, states.shape[1])
+        next_observation: Observations = dynamics.observe(following) @ change
+        next_q = self.q_values(next_observation).reshape(*outcomes.reward.shape, -1)
+        q = self.q_values(dynamics.observe(states) @ change)
+        reward, ended = outcomes.reward, outcomes.terminated
+        if ended.any():  # many programs give the last step a penalty, which is no mistake
+            reward = np.where(ended, min(float(reward.mean()), float(q[ended].mean())), reward)
+        return Backup(q, reward, next_q, self.discount, next_observation, ~ended, self.reward_scale)
 
     @cached_property
     def right_agreement(self) -> Agreement:
@@ -78,14 +109,15 @@ class Measurement(PlayedAgent):
     @cached_property
     def agreements(self) -> list[tuple[Agreement, Equation]]:
         """The wrong equations, that with the smallest error first."""
-        return sorted(agreements(self.visited, self.backup), key=lambda item: item[0].error)
+        found = agreements(self, self.backup, self.changed_backup)
+        return sorted(found, key=lambda item: item[0].error)
 
     @cached_property
     def lasting_action(self) -> LastingAction:
         """The number of steps, from 2 to 8, that an action lasts by the values."""
         found = []
         for steps in range(2, 9):
-            values = self.visited.backup(steps=steps)
+            values = self.changed_backup(steps=steps)
             found.append(LastingAction(steps, agreement(values, values.right)))
         return min(found, key=lambda each: each.agreement.error)
 
@@ -115,7 +147,7 @@ class Measurement(PlayedAgent):
     @cached_property
     def value(self) -> Fit:
         """The fit of the states' values."""
-        return signals.value_fit(self.learned_q, self.exact_q)
+        return signals.line_fit(self.learned_q.mean(axis=1), self.exact_q.mean(axis=1))
 
     @cached_property
     def advantage(self) -> Fit:

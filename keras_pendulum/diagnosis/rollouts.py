@@ -46,7 +46,7 @@ def roll_out(
         repeats: of each row, because a policy may be random; N is rows · repeats.
     """
     random = np.random.RandomState(4)
-    states = m.visited.states
+    states = m.visited_states
     states = np.repeat(states[random.randint(len(states), size=rows)], repeats, axis=0)
     action = np.repeat(random.randint(len(m.efforts), size=rows), repeats)
     number = np.arange(len(states))

@@ -41,11 +41,6 @@ def advantages(q: Array) -> Array:
     return q - q.mean(axis=1, keepdims=True)
 
 
-def value_fit(learned: Array, exact: Array) -> Fit:
-    """Returns the fit of the states' values."""
-    return line_fit(learned.mean(axis=1), exact.mean(axis=1))
-
-
 def advantage_fit(learned: Array, exact: Array) -> Fit:
     """Returns the fit of the advantages of all states and torques."""
     return line_fit(advantages(learned), advantages(exact))

@@ -55,6 +55,17 @@ class KnownDynamics(Solution):
     def outcomes(self, states: Array, efforts: Array) -> Outcomes:
         """Returns the outcomes of one step, of states [N, S] and efforts [A] or [N, A]."""
 
+    def lasting_outcomes(self, states: Array, efforts: Array, steps: int) -> Outcomes:
+        """Returns the outcomes of efforts [A] that act for some steps; the rewards are added."""
+        reward, state, ended = self.outcomes(states, efforts)
+        efforts = np.tile(efforts, len(states))[:, None]
+        for _ in range(steps - 1):
+            again = self.outcomes(state.reshape(reward.size, -1), efforts)
+            reward = reward + np.where(ended, 0, again.reward.reshape(reward.shape))
+            state = np.where(ended[..., None], state, again.state.reshape(state.shape))
+            ended = ended | again.terminated.reshape(ended.shape)
+        return Outcomes(reward, state, ended)
+
     def are_over(self, states: Array) -> NDArray[np.bool_]:
         """Returns whether states [N, S] are those after the end of an episode."""
         return np.zeros(len(states), bool)
