@@ -7,17 +7,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from keras_pendulum.diagnosis import comparisons, repairs
-from keras_pendulum.diagnosis.comparisons import SAME_ACTIONS
+from keras_pendulum.diagnosis import repairs
 from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
+from keras_pendulum.diagnosis.signals import advantage_fit, output_efforts
+from keras_pendulum.diagnosis.stored_actions import SAME_ACTIONS, match_actions
 
 _SMALL = 0.75  # of the largest torque that the pendulum takes
 
 
 def observation_map(m: Measurement) -> Finding | None:
     """Finds a change of the observation with which the agent acts as its run."""
-    actions = comparisons.match_actions(m)
+    actions = match_actions(m)
     if actions is None or actions.declared > SAME_ACTIONS:
         return None
     if actions.by_observation > max(SAME_ACTIONS, actions.declared + 0.3):
@@ -31,7 +32,7 @@ def observation_map(m: Measurement) -> Finding | None:
 
 def torque_map(m: Measurement) -> Finding | None:
     """Finds torques with which the agent acts as its run, or the outputs fit the exact values."""
-    actions = comparisons.match_actions(m)
+    actions = match_actions(m)
     if actions is not None:
         if actions.declared > SAME_ACTIONS:
             return None
@@ -54,7 +55,7 @@ def torque_map(m: Measurement) -> Finding | None:
         return Finding("torque-map", evidence, "all different")
     if m.value.correlation < 0.9 or not 0.5 < m.value.slope < 2 or not m.dynamics.any_effort:
         return None
-    matched = comparisons.matched_correlation(m)
+    matched = _matched_correlation(m)
     if matched > 0.4 and matched > m.advantage.correlation + 0.2:
         torques = np.empty_like(m.efforts)
         torques[np.argsort(m.output_efforts, kind="stable")] = np.sort(m.efforts)
@@ -75,6 +76,17 @@ def torque_map(m: Measurement) -> Finding | None:
             repairs.change_efforts(m, gain * m.efforts, f"torques times {gain:.2g}"),
         )
     return None
+
+
+def _matched_correlation(m: Measurement) -> float:
+    """Returns the correlation of the advantages with rank-matched outputs.
+
+    The order comes from the even states, the correlation from the odd ones.
+    """
+    found = output_efforts(m.learned_q[::2], m.exact_q[::2], m.efforts)
+    order = np.argsort(found, kind="stable")
+    exact = m.exact_q[1::2][:, np.argsort(m.efforts)]
+    return advantage_fit(m.learned_q[1::2][:, order], exact).correlation
 
 
 def small_torques(m: Measurement) -> Finding | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.motion import FEW, Motion, Rows
 from keras_pendulum.diagnosis.signals import Array, line_fit
-from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
 _SAME_STATE = 1e-3  # m, m/s, rad or rad/s
@@ -20,13 +20,11 @@ class CartPoleMotion(Motion):
 
     expected = "[x, ẋ, θ, θ̇] of CartPole-v1, without normalisation"
 
-    def __init__(
-        self, dynamics: KnownDynamics, replay: Transitions, stored: Array, efforts: Array
-    ) -> None:
-        super().__init__(dynamics, replay, stored, efforts)
-        self.errors = _errors(
-            dynamics, self.replay.observation, self.replay.next_observation, efforts
-        )
+    @cached_property
+    def errors(self) -> Array:
+        """The largest difference [N, A] of the next state to that of each effort."""
+        replay = self.replay
+        return _errors(self.dynamics, replay.observation, replay.next_observation, self.efforts)
 
     @classmethod
     def explains(

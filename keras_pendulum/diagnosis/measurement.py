@@ -17,8 +17,10 @@ from keras_pendulum.diagnosis.equations import agreements
 from keras_pendulum.diagnosis.played_agent import PlayedAgent, no_report
 from keras_pendulum.diagnosis.signals import Array, Fit
 from keras_pendulum.diagnosis.states import observation_changes, visited_states
+from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.task import Task
 from keras_pendulum.evaluate.policy import Observations
+from keras_pendulum.evaluate.q_policies import DQNPolicy
 
 
 class LastingAction(NamedTuple):
@@ -188,6 +190,24 @@ class Measurement(PlayedAgent):
         collected = episodes.returns_to_go(self.discount)[:half:5][playing]
         learned = self.q_values(self.dynamics.observe(episodes.states[:half:5][playing]))
         return float(np.median(learned.max(axis=1) - collected)) / self.value_spread
+
+    @cached_property
+    def stuck_units(self) -> tuple[float, float]:
+        """The shares of saturated tanh outputs and of dead ReLU units, of the worst layer.
+
+        Both are 0 where the policy is not that of a DQN.
+        """
+        saturated, dead = [0.0], [0.0]
+        if isinstance(self.policy, DQNPolicy):
+            weights, features = self.policy.weights, self.dynamics.observe(self.states)
+            names = activations_of(self.policy.activation, len(weights) // 2 - 1)
+            for kernel, bias, name in zip(weights[:-2:2], weights[1:-2:2], names, strict=True):
+                features = ACTIVATIONS[name](features @ kernel + bias)
+                if name == "tanh":
+                    saturated.append(float((np.abs(features) > 0.99).mean()))
+                elif name == "relu":
+                    dead.append(float((features.max(axis=0) <= 0).mean()))
+        return max(saturated), max(dead)
 
     @cached_property
     def value_spread(self) -> float:

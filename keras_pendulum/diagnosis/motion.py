@@ -35,10 +35,9 @@ class Motion(ABC):
     def __init__(
         self, dynamics: KnownDynamics, replay: Transitions, stored: Array, efforts: Array
     ) -> None:
-        self.first = max(0, len(replay.action) - _MOST_TRANSITIONS)
         self.dynamics, self.efforts = dynamics, efforts
-        self.replay = Transitions(*(array[self.first :] for array in replay))
-        self.stored = stored[self.first :]
+        self.replay = Transitions(*(array[-_MOST_TRANSITIONS:] for array in replay))
+        self.stored = stored[-_MOST_TRANSITIONS:]
 
     @classmethod
     @abstractmethod

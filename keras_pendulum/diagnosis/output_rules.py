@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from keras_pendulum.diagnosis.faults import Fault, Finding
-from keras_pendulum.diagnosis.hidden_units import stuck_units
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.environments.pendulum import Pendulum
@@ -112,7 +111,7 @@ def _bounded_everywhere(m: Measurement) -> Finding | None:
 
 def same_everywhere(m: Measurement) -> Finding | None:
     """Finds values that are the same for all states or for all actions."""
-    units = max(stuck_units(m))
+    units = max(m.stuck_units)
     spread = m.learned_q.std(axis=0)
     if _is_constant(spread, m.learned_q):
         evidence = f"values that differ by {spread.max():.1g} from state to state"
@@ -146,7 +145,7 @@ def batch_broadcast(m: Measurement) -> Finding | None:
     values = m.backup.q
     mean, spread = float(values.mean()), float(values.std())
     reward = mean * (1 - m.discount)  # of a step, if this value is the mean target
-    if _is_constant(values.std(axis=0), values) or max(stuck_units(m)) > 0.99:  # a dead network
+    if _is_constant(values.std(axis=0), values) or max(m.stuck_units) > 0.99:  # a dead network
         return None
     if m.task.never_terminates:
         own = spread < 0.3 * m.backup.reward.std() and _LOWEST_MEAN_REWARD < reward < -0.3

@@ -7,8 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.record_observations import undo_change
-from keras_pendulum.diagnosis.record_sources import read_actions
 from keras_pendulum.diagnosis.recorded_steps import Steps
 from keras_pendulum.diagnosis.signals import Array, nearest
 from keras_pendulum.optimum.known_dynamics import KnownDynamics
@@ -42,23 +40,18 @@ class PlayedSteps(NamedTuple):
     dynamics: KnownDynamics
 
     @classmethod
-    def of(cls, steps: Steps, efforts: Array | None, dynamics: KnownDynamics) -> PlayedSteps:
-        """Returns the steps with their efforts; `efforts` are those of the agent's outputs.
-
-        Raises ConfigError as `read_actions` does.
-        """
-        indices, effort = read_actions(steps.action, efforts, "record")
-        steps, levels = undo_change(dynamics, steps, "record"), efforts
-        if effort is None:
-            assert efforts is not None
-            effort = efforts[indices]
-        elif efforts is not None:
+    def of(
+        cls, steps: Steps, effort: Array, outputs: Array | None, dynamics: KnownDynamics
+    ) -> PlayedSteps:
+        """Returns the steps with their efforts [N]; `outputs` [A] are those of the agent."""
+        levels = _LEVELS if outputs is None else outputs
+        if outputs is not None:
             used = np.unique(effort)
-            matched = len(np.unique(nearest(used, efforts)))
-            smaller = matched < 0.7 * len(used) <= 0.7 * len(efforts)
+            matched = len(np.unique(nearest(used, outputs)))
+            smaller = matched < 0.7 * len(used) <= 0.7 * len(outputs)
             if smaller and np.ptp(used) > 2 * _CLOSE:  # they are not those of the outputs
                 levels = used
-        return cls(steps, effort, _LEVELS if levels is None else levels, dynamics)
+        return cls(steps, effort, levels, dynamics)
 
     def random_shares(self) -> RandomShares | None:
         """Returns about the share of random actions in parts of the run; None if it is short.

@@ -7,7 +7,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from keras_pendulum.diagnosis.motions import motion_kind
+from keras_pendulum.diagnosis.cartpole_motion import CartPoleMotion
+from keras_pendulum.diagnosis.motion import Motion
+from keras_pendulum.diagnosis.pendulum_motion import PendulumMotion
 from keras_pendulum.diagnosis.recorded_steps import Steps
 from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.dqn.replay_buffer import Transitions
@@ -17,6 +19,11 @@ from keras_pendulum.optimum.known_dynamics import KnownDynamics
 _ROWS = 5000
 
 Recorded = TypeVar("Recorded", Steps, Transitions)
+
+
+def motion_kind(dynamics: KnownDynamics) -> type[Motion]:
+    """Returns the class of the motion of a task."""
+    return PendulumMotion if dynamics.any_effort else CartPoleMotion
 
 
 def undo_change(dynamics: KnownDynamics, recorded: Recorded, name: str) -> Recorded:
@@ -31,7 +38,7 @@ def undo_change(dynamics: KnownDynamics, recorded: Recorded, name: str) -> Recor
         each[-_ROWS:] for each in (recorded.observation, recorded.action, recorded.next_observation)
     )
     motion = motion_kind(dynamics)
-    identity: NDArray[Any] = np.eye(before.shape[1], dtype=np.float32)
+    identity = np.eye(before.shape[1], dtype=np.float32)
     made: list[NDArray[Any]] = list(observation_changes(dynamics).values())
     for change in (identity, *made, *map(np.linalg.inv, made)):
         if motion.explains(dynamics, before @ change, action, after @ change):

@@ -45,17 +45,19 @@ def make_record(
     """
     if record is None and transitions is None:
         return None
-    played = None
+    played = own = None
     if record is not None:
-        played = PlayedSteps.of(steps_of(record, dynamics.task), efforts, dynamics)
-    if transitions is None:
-        assert played is not None
-        stored, name = Transitions(*played.steps[:5]), "record"
-    else:
-        stored, name = transitions_of(transitions, dynamics.task), "transitions"
-    stored = undo_change(dynamics, stored, name)
-    indices, effort = read_actions(np.asarray(stored.action), efforts, name)
-    own = None
+        steps = steps_of(record, dynamics.task)
+        indices, effort = read_actions(steps.action, efforts, "record")
+        acted = effort
+        if acted is None:
+            assert efforts is not None
+            acted = efforts[indices]
+        steps = undo_change(dynamics, steps, "record")
+        played, stored = PlayedSteps.of(steps, acted, efforts, dynamics), Transitions(*steps[:5])
+    if transitions is not None:
+        stored = undo_change(dynamics, transitions_of(transitions, dynamics.task), "transitions")
+        indices, effort = read_actions(np.asarray(stored.action), efforts, "transitions")
     if efforts is None:
         own, indices = np.unique(indices, return_inverse=True)
     replay = stored._replace(action=np.asarray(indices, np.int32))

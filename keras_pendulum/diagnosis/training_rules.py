@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from keras_pendulum.diagnosis import comparisons, repairs
+from keras_pendulum.diagnosis import repairs
 from keras_pendulum.diagnosis.faults import Finding
-from keras_pendulum.diagnosis.hidden_units import stuck_units
 from keras_pendulum.diagnosis.lasting_rules import clearly_last
 from keras_pendulum.diagnosis.measurement import Measurement
 
@@ -59,10 +58,17 @@ def untrained_outputs(m: Measurement) -> Finding | None:
 
 
 def stored_rewards(m: Measurement) -> Finding | None:
-    """Finds values of the stored actions that are their rewards."""
+    """Finds values of the stored actions that are their rewards, not their targets."""
     if m.record is None or len(m.record.replay.action) == 0:
         return None
-    error, declared = comparisons.stored_errors(m, m.record)
+    replay = m.record.replay
+    reward = replay.reward / m.reward_scale
+    learned = m.q_values(replay.observation)[np.arange(len(reward)), replay.action]
+    target = reward + m.discount * m.q_values(replay.next_observation).max(axis=1)
+    spread = max(float(reward.std()), 1e-9)
+    error, declared = (
+        float(np.sqrt(np.mean((learned - truth) ** 2))) / spread for truth in (reward, target)
+    )
     if error >= min(0.2, 0.3 * declared):
         return None
     evidence = f"values of the stored actions within {error:.0%} of their rewards"
@@ -87,7 +93,7 @@ def learning_rate(m: Measurement) -> Finding | None:
     rate, schedule = m.record.config.learning_rate, m.record.config.learning_rate_schedule
     if rate < 5e-3 and (schedule != "constant" or rate < 2e-3):
         return None
-    saturated, dead = stuck_units(m)
+    saturated, dead = m.stuck_units
     evidence = f"learning rate {rate:g}, {schedule}; {saturated:.0%} of a layer's tanh "
     evidence += f"units saturated, {dead:.0%} of the ReLU units dead"
     return Finding("learning-rate", evidence, "1e-3, falling to 0")
@@ -95,7 +101,7 @@ def learning_rate(m: Measurement) -> Finding | None:
 
 def saturated_layer(m: Measurement) -> Finding | None:
     """Finds the saturated layer that a large learning rate leaves."""
-    saturated, dead = stuck_units(m)
+    saturated, dead = m.stuck_units
     if m.record is None and (saturated > 0.93 or dead > 0.8) and m.value.correlation > 0.8:
         evidence = f"{max(saturated, dead):.0%} of a layer's units saturated or dead"
         return Finding("learning-rate", evidence, "below 85 %")

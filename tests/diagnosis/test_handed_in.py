@@ -419,7 +419,7 @@ def test_usual_exploration_is_no_fault(episodes: int, epsilon: Callable[[float],
 
 def test_random_torques_may_be_smaller_than_those_of_the_outputs() -> None:
     env = record_run(epsilon=lambda done: 1.0 if done < 0.5 else 0.1)
-    played = PlayedSteps.of(env.steps._replace(action=env.steps.action / 2), TORQUES, PENDULUM)
+    played = PlayedSteps.of(env.steps, env.steps.action / 2, TORQUES, PENDULUM)
     shares = played.random_shares()
     assert shares is not None and min(shares.beginning, shares.tenths[:5].min()) > 0.5
 

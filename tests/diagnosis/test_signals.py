@@ -4,7 +4,6 @@ from exact_agent import exact_values, measure
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import signals
-from keras_pendulum.diagnosis.hidden_units import stuck_units
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.evaluate.q_policies import DQNPolicy
@@ -50,5 +49,5 @@ def test_units_counts_saturated_and_dead_units() -> None:
     network.set_weights(
         [0 * kernel, bias + biases, 0 * rest[0], np.array([-1, 1], np.float32), *rest[2:]]
     )
-    assert stuck_units(Measurement(DQNPolicy(network), Pendulum(), 0.9)) == (0.5, 0.5)
-    assert stuck_units(measure(exact_values)) == (0, 0)
+    assert Measurement(DQNPolicy(network), Pendulum(), 0.9).stuck_units == (0.5, 0.5)
+    assert measure(exact_values).stuck_units == (0, 0)

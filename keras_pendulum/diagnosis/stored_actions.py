@@ -1,4 +1,4 @@
-"""An agent compared with the record of its run, and its outputs with those of other efforts."""
+"""The actions of an agent, compared with those that its run stored."""
 
 from __future__ import annotations
 
@@ -7,22 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from keras_pendulum.diagnosis.measurement import Measurement
-from keras_pendulum.diagnosis.run_record import RunRecord
-from keras_pendulum.diagnosis.signals import Array, advantage_fit, line_fit, output_efforts
+from keras_pendulum.diagnosis.signals import Array, line_fit
 from keras_pendulum.diagnosis.states import observation_changes
 
 SAME_ACTIONS = 0.8  # correlation of an agent's efforts with those that its run stored
-
-
-def matched_correlation(m: Measurement) -> float:
-    """Returns the correlation of the advantages with rank-matched outputs.
-
-    The order comes from the even states, the correlation from the odd ones.
-    """
-    found = output_efforts(m.learned_q[::2], m.exact_q[::2], m.efforts)
-    order = np.argsort(found, kind="stable")
-    exact = m.exact_q[1::2][:, np.argsort(m.efforts)]
-    return advantage_fit(m.learned_q[1::2][:, order], exact).correlation
 
 
 class ActionMatch(NamedTuple):
@@ -64,18 +52,3 @@ def match_actions(m: Measurement) -> ActionMatch | None:
         best,
         by_change[best],
     )
-
-
-def stored_errors(m: Measurement, record: RunRecord) -> tuple[float, float]:
-    """Returns the errors of the stored actions' values, as shares of the rewards' spread.
-
-    The first error is that to the stored rewards, the second that to the targets of the declared
-    discount.
-    """
-    replay = record.replay
-    reward = replay.reward / m.reward_scale
-    learned = m.q_values(replay.observation)[np.arange(len(reward)), replay.action]
-    target = reward + m.discount * m.q_values(replay.next_observation).max(axis=1)
-    spread = max(float(reward.std()), 1e-9)
-    errors = [float(np.sqrt(np.mean((learned - truth) ** 2))) for truth in (reward, target)]
-    return errors[0] / spread, errors[1] / spread
