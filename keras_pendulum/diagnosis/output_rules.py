@@ -44,69 +44,69 @@ def bounded_output(m: Measurement) -> Finding | None:
     """Finds the traces of an activation after the last layer."""
     if isinstance(m.policy, DQNPolicy):  # its head is linear
         return None
-    if not m.task.never_terminates:
-        return _bounded_everywhere(m)
-    outputs = m.learned_q * m.reward_scale
-    low, high = float(outputs.min()), float(outputs.max())
-    sums = outputs.sum(axis=1)
-    tiny = bool(((outputs > 0) & (outputs < 1e-6)).any())  # of a ReLU head, all are 0 or larger
-    at_zero, at_minus_one = np.mean(np.abs(outputs) < 1e-3), np.mean(outputs < -0.999)
-    if low >= 0 and np.abs(sums - 1).max() < 1e-3:
-        variant, evidence = (
-            "softmax",
-            "the values of each state are from 0 to 1, and their sum is 1",
-        )
-    elif _has_logarithms(outputs):
-        variant, evidence = "log-softmax", _LOGARITHMS
-    elif low >= -1 and high <= 1 and at_minus_one > _AT_THE_BOUND:
-        variant = "tanh"
-        evidence = f"no value is below -1, and {at_minus_one:.0%} of them are there"
-    elif low == 0 and not tiny and at_zero > _AT_THE_BOUND:
-        variant, evidence = "relu", f"no value is below 0, and {at_zero:.0%} of them are there"
-    elif low >= 0 and high <= 1 and at_zero > _AT_THE_BOUND:
-        variant = "sigmoid"
-        evidence = f"all values are from 0 to 1, and {at_zero:.0%} of them are near 0"
+    if m.task.never_terminates:
+        found = _bounds(m.learned_q * m.reward_scale)
+        exact = f"All returns of the pendulum are negative, down to {m.exact_q.min():.0f}."
     else:
+        found = _bounds_everywhere(m)
+        exact = f"A pole that does not fall has a value of {m.exact_q.max():.0f}."
+    if found is None:
         return None
+    variant, evidence = found
     text = Fault(
-        f"The last layer ends with {variant}, which cannot give these values. All returns of the "
-        f"pendulum are negative, down to {m.exact_q.min():.0f}.",
+        f"The last layer ends with {variant}, which cannot give these values. {exact}",
         f"Remove {variant} from the last layer: Q-values need a linear head.",
     )
     return Finding("bounded-output", evidence, "no bound", variant=variant, text=text)
 
 
-def _has_logarithms(outputs: Array) -> bool:
-    """Returns whether values [N, A] are logarithms of shares."""
-    return bool(outputs.max() <= 0 and np.abs(np.exp(outputs).sum(axis=1) - 1).max() < 1e-3)
+def _bounds(outputs: Array) -> tuple[str, str] | None:
+    """Returns the activation whose bounds outputs [N, A] of the pendulum have, and the evidence."""
+    low, high = float(outputs.min()), float(outputs.max())
+    tiny = bool(((outputs > 0) & (outputs < 1e-6)).any())  # of a ReLU head, all are 0 or larger
+    at_zero, at_minus_one = np.mean(np.abs(outputs) < 1e-3), np.mean(outputs < -0.999)
+    if _are_shares(outputs):
+        return "softmax", "the values of each state are from 0 to 1, and their sum is 1"
+    if _are_logarithms(outputs):
+        return "log-softmax", _LOGARITHMS
+    if low >= -1 and high <= 1 and at_minus_one > _AT_THE_BOUND:
+        return "tanh", f"no value is below -1, and {at_minus_one:.0%} of them are there"
+    if low == 0 and not tiny and at_zero > _AT_THE_BOUND:
+        return "relu", f"no value is below 0, and {at_zero:.0%} of them are there"
+    if low >= 0 and high <= 1 and at_zero > _AT_THE_BOUND:
+        return "sigmoid", f"all values are from 0 to 1, and {at_zero:.0%} of them are near 0"
+    return None
 
 
-def _bounded_everywhere(m: Measurement) -> Finding | None:
-    """Finds bounds where the values of the task are positive: far away, a linear head has none."""
+def _bounds_everywhere(m: Measurement) -> tuple[str, str] | None:
+    """Returns the same where the values are positive: far away, a linear head has no bounds."""
     random = np.random.RandomState(0)
     far = random.normal(scale=1000, size=(200, m.task.observation_size)).astype(np.float32)
     outputs = np.concatenate([m.q_values(far), m.learned_q]) * m.reward_scale
     low, high = float(outputs.min()), float(outputs.max())
     # Small values of hidden layers with tanh do not leave -1 to 1 either, but few are at a bound.
     at_bound = np.mean(np.abs(outputs) > 0.99) > _AT_THE_BOUND
-    if low >= 0 and np.abs(outputs.sum(axis=1) - 1).max() < 1e-3:
-        variant, bounds = "softmax", "from 0 to 1, and their sum is 1"
-    elif _has_logarithms(outputs):
-        variant, bounds = "log-softmax", f"below 0, and {_LOGARITHMS}"
-    elif np.ptp(outputs) < 1e-3 and 0.999 < high <= 1:
-        variant, bounds = "tanh or sigmoid", "1, also far outside of the task"
-    elif 0 <= low < 0.1 and high <= 1 and at_bound:
-        variant, bounds = "sigmoid", "from 0 to 1, also far outside of the task"
-    elif -1 <= low < 0 and high <= 1 and at_bound:
-        variant, bounds = "tanh", "from -1 to 1, also far outside of the task"
-    else:
-        return None
-    text = Fault(
-        f"The last layer ends with {variant}, which cannot give these values. A pole that does not "
-        f"fall has a value of {m.exact_q.max():.0f}.",
-        f"Remove {variant} from the last layer: Q-values need a linear head.",
-    )
-    return Finding("bounded-output", f"all values are {bounds}", "no bound", None, variant, text)
+    if _are_shares(outputs):
+        return "softmax", "all values are from 0 to 1, and their sum is 1"
+    if _are_logarithms(outputs):
+        return "log-softmax", f"all values are below 0, and {_LOGARITHMS}"
+    if np.ptp(outputs) < 1e-3 and 0.999 < high <= 1:
+        return "tanh or sigmoid", "all values are 1, also far outside of the task"
+    if 0 <= low < 0.1 and high <= 1 and at_bound:
+        return "sigmoid", "all values are from 0 to 1, also far outside of the task"
+    if -1 <= low < 0 and high <= 1 and at_bound:
+        return "tanh", "all values are from -1 to 1, also far outside of the task"
+    return None
+
+
+def _are_shares(outputs: Array) -> bool:
+    """Returns whether values [N, A] are positive, with the sum 1 for each state."""
+    return bool(outputs.min() >= 0 and np.abs(outputs.sum(axis=1) - 1).max() < 1e-3)
+
+
+def _are_logarithms(outputs: Array) -> bool:
+    """Returns whether values [N, A] are logarithms of shares."""
+    return bool(outputs.max() <= 0 and _are_shares(np.exp(outputs)))
 
 
 def same_everywhere(m: Measurement) -> Finding | None:

@@ -72,11 +72,8 @@ class PlayedAgent:
             self.policy.reset()
             played.append(simulate(act, self.dynamics, starts))
             self.on_episodes(len(starts))
-        return Episodes(
-            np.concatenate([each.states for each in played], axis=1),
-            np.concatenate([each.rewards for each in played], axis=1),
-            np.concatenate([each.playing for each in played], axis=1),
-        )
+        columns = zip(*played, strict=True)
+        return Episodes(*(np.concatenate(column, axis=1) for column in columns))
 
     def act(self, observations: Observations) -> Array:
         """Returns the efforts [B] in N·m or N."""

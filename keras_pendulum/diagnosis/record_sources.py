@@ -87,10 +87,10 @@ def transitions_of(given: Any, task: Task) -> Transitions:
     stored = used[-1] + 1 if len(used) else rows
     # One environment after the other, so that each step stands behind the one before it.
     steps = (np.concatenate(array[:stored].swapaxes(0, 1)) for array in arrays.values())
-    observation, action, reward, following, terminated = (
-        array if array.shape[1] > 1 else array[:, 0] for array in steps
-    )
-    _require_finite("transitions", observation, action, reward, following, terminated)
+    stored_columns = [array if array.shape[1] > 1 else array[:, 0] for array in steps]
+    if not all(np.isfinite(column).all() for column in stored_columns):
+        raise ConfigError("transitions: NaN or infinite numbers; expected finite ones")
+    observation, action, reward, following, terminated = stored_columns
     if not np.isin(terminated, (0, 1)).all():
         raise ConfigError("transitions: done has other values than 0 and 1")
     return Transitions(
@@ -200,8 +200,3 @@ def _as_array(name: str, column: Any) -> Array:
     if array.dtype.kind not in "fiub" or array.ndim < 1:
         raise ConfigError(f"transitions: {name} is not an array of numbers, in {_FIELDS}")
     return array
-
-
-def _require_finite(name: str, *arrays: Array) -> None:
-    if not all(np.isfinite(array).all() for array in arrays):
-        raise ConfigError(f"{name}: NaN or infinite numbers; expected finite ones")

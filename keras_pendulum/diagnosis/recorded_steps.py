@@ -114,13 +114,8 @@ def _read_array(archive: zipfile.ZipFile, name: str) -> Array:
         raise ValueError(f"{name} has {member.file_size} bytes")
     with archive.open(member) as file:
         content = io.BytesIO(file.read(_LARGEST_FILE))
-    version = np.lib.format.read_magic(content)
-    read_header = (
-        np.lib.format.read_array_header_1_0
-        if version == (1, 0)
-        else np.lib.format.read_array_header_2_0
-    )
-    shape, _, kind = read_header(content)
+    np.lib.format.read_magic(content)
+    shape, _, kind = np.lib.format.read_array_header_1_0(content)  # as `write_steps` writes it
     kinds, dimensions = _COLUMNS[name]
     if kind.kind not in kinds or len(shape) not in dimensions:
         raise ValueError(f"{name} has the type {kind} and the shape {list(shape)}")

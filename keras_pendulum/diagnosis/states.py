@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,7 @@ _VISITED = 200
 _NEAR_AN_END = 10  # steps
 
 
-@dataclass(frozen=True)
-class Episodes:
+class Episodes(NamedTuple):
     """Simulated episodes from B starts."""
 
     states: Array  # [steps, B, S]
