@@ -16,7 +16,7 @@ from keras_pendulum.diagnosis.equation import RIGHT, Equation
 from keras_pendulum.diagnosis.equations import agreements
 from keras_pendulum.diagnosis.played_agent import PlayedAgent, no_report
 from keras_pendulum.diagnosis.signals import Array, Fit
-from keras_pendulum.diagnosis.states import observation_changes, visited_states
+from keras_pendulum.diagnosis.states import explored_states, observation_changes
 from keras_pendulum.dqn.policy import ACTIVATIONS, activations_of
 from keras_pendulum.environments.task import Task
 from keras_pendulum.evaluate.policy import Observations
@@ -50,8 +50,12 @@ class Measurement(PlayedAgent):
     def act(self, observations: Observations) -> Array:
         """Returns the efforts [B] in N·m or N; values that are not finite have efforts too."""
         if self.policy.has_q_values and not self.finite:
-            return self.efforts[self.q_values(observations).argmax(axis=1)]
+            return self.greedy_efforts(observations)
         return super().act(observations)
+
+    def greedy_efforts(self, observations: Observations) -> Array:
+        """Returns the efforts [B] of the outputs with the highest values."""
+        return self.efforts[self.q_values(observations).argmax(axis=1)]
 
     def q_values(self, observations: Observations) -> Array:
         """Returns the learned Q-values [B, A] in units of return."""
@@ -61,8 +65,10 @@ class Measurement(PlayedAgent):
 
     @cached_property
     def visited_states(self) -> Array:
-        """The states [N, S] that the network visits itself, with random actions."""
-        return visited_states(self.q_values, self.efforts, self.dynamics, self.starts)
+        """States [200, S] that the network visits itself, with many random actions."""
+        return explored_states(
+            self.greedy_efforts, self.efforts, self.dynamics, self.starts, seed=2, count=200
+        )
 
     @cached_property
     def backup(self) -> Backup:

@@ -14,7 +14,7 @@ from keras_pendulum.diagnosis.motion import Motion
 from keras_pendulum.diagnosis.record_observations import motion_kind
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.diagnosis.states import Act, Episodes, simulate, training_states
+from keras_pendulum.diagnosis.states import Act, Episodes, explored_states, simulate
 from keras_pendulum.environments.task import Task
 from keras_pendulum.errors import ConfigError
 from keras_pendulum.evaluate.policy import Observations, Policy
@@ -146,5 +146,11 @@ class PlayedAgent:
 
     @cached_property
     def states(self) -> Array:
-        """States [N, S] that a run of this task meets."""
-        return training_states(self.table, self.dynamics, self.discount, self.starts)
+        """States [1500, S] that a run meets: the exact policy with many random actions."""
+        exact = self.dynamics
+
+        def greedy(observations: Observations) -> Array:
+            return exact.greedy_efforts(self.table, self.discount, exact.states_of(observations))
+
+        efforts = exact.efforts(self.task.actions().values)
+        return explored_states(greedy, efforts, exact, self.starts, seed=1, count=1500)

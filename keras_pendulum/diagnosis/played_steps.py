@@ -191,8 +191,8 @@ class PlayedSteps(NamedTuple):
             [shown(float(rewards[rows].sum()), rows.stop - rows.start) for rows in self.episodes()]
         )
 
-    def start_sectors(self, sectors: int = 8) -> tuple[int, int]:
-        """Returns in how many sectors of θ an episode starts, and the number of episodes."""
+    def start_sectors(self) -> tuple[int, int]:
+        """Returns in how many of 8 sectors of θ an episode starts, and the number of episodes."""
         theta = self.dynamics.states_of(self.steps.observation[self.steps.first])[:, 0]
-        found = np.floor((theta + np.pi) / (2 * np.pi) * sectors).clip(0, sectors - 1)
+        found = np.floor((theta + np.pi) / (2 * np.pi) * 8).clip(0, 7)
         return len(np.unique(found)), len(theta)

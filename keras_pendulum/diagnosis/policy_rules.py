@@ -20,8 +20,7 @@ from keras_pendulum.diagnosis.rollouts import roll_out
 from keras_pendulum.diagnosis.target_equations import TARGETS
 
 _STEPS = 10
-_ROWS = 300  # states with an action each
-_REPEATS = 4  # of each row, because a policy may be random
+_REPEATS = 4  # of each state, because a policy may be random
 _LARGEST_ERROR = 0.8
 _SHARE = 0.7  # of the error of the right equation
 _SHARE_OF_BOTH = 0.9  # the same where one step fits better, too, and advantages have been learned
@@ -103,7 +102,7 @@ def followed_policy(m: Measurement) -> Finding | None:
 
 def _over_steps(m: Measurement, next_action: NextAction) -> _LongAgreement:
     """Returns how well the values agree with ten rewards and the value after them."""
-    rollouts = roll_out(m, next_action, _STEPS, _ROWS, _REPEATS)
-    error = (rollouts.q - rollouts.target(m.discount)).reshape(_ROWS, _REPEATS).mean(axis=1)
+    rollouts = roll_out(m, next_action, _STEPS, _REPEATS)
+    error = (rollouts.q - rollouts.target(m.discount)).reshape(-1, _REPEATS).mean(axis=1)
     error /= m.backup.spread
     return _LongAgreement(float(np.sqrt(np.mean(error**2))), float(error.mean()))

@@ -14,6 +14,8 @@ from keras_pendulum.diagnosis.equation import NextAction
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.signals import Array
 
+_STATES = 300
+
 
 class Rollouts(NamedTuple):
     """Steps from N states at which a network's value of a random action is known."""
@@ -33,22 +35,19 @@ class Rollouts(NamedTuple):
         return self.rewards_of(steps, discount) + discount**steps * self.values[-1]
 
 
-def roll_out(
-    m: Measurement, next_action: NextAction, steps: int, rows: int = 300, repeats: int = 1
-) -> Rollouts:
-    """Returns the steps of a policy after random actions.
+def roll_out(m: Measurement, next_action: NextAction, steps: int, repeats: int = 1) -> Rollouts:
+    """Returns the steps of a policy after random actions at 300 states.
 
     Args:
         m: the agent.
         next_action: the policy.
         steps: T.
-        rows: states with an action each.
-        repeats: of each row, because a policy may be random; N is rows · repeats.
+        repeats: of each state, because a policy may be random; N is 300 · repeats.
     """
     random = np.random.RandomState(4)
     states = m.visited_states
-    states = np.repeat(states[random.randint(len(states), size=rows)], repeats, axis=0)
-    action = np.repeat(random.randint(len(m.efforts), size=rows), repeats)
+    states = np.repeat(states[random.randint(len(states), size=_STATES)], repeats, axis=0)
+    action = np.repeat(random.randint(len(m.efforts), size=_STATES), repeats)
     number = np.arange(len(states))
     q = m.q_values(m.dynamics.observe(states))[number, action]
     rewards, values = np.empty((2, steps, len(states)))

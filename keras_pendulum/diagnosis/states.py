@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.optimum.known_dynamics import KnownDynamics, Table
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
 # From observations [B, D] to efforts [B] in N·m or N.
 Act = Callable[[NDArray[np.float32]], Array]
 
-_STATES = 1500  # of each other kind
-_VISITED = 200
 _NEAR_AN_END = 10  # steps
 
 
@@ -66,52 +64,23 @@ def simulate(act: Act, exact: KnownDynamics, starts: Array) -> Episodes:
     return Episodes(states, rewards, playing)
 
 
-def visited_states(q_values: Act, efforts: Array, exact: KnownDynamics, starts: Array) -> Array:
-    """Returns 200 states [N, S] that a network visits, with many random actions.
-
-    Args:
-        q_values: from observations [B, D] to Q-values [B, A].
-        efforts: of the outputs, [A].
-        exact: the task.
-        starts: [B, S].
-    """
-
-    def greedy(observations: NDArray[np.float32]) -> Array:
-        return efforts[q_values(observations).argmax(axis=1)]
-
-    return _explored(greedy, efforts, exact, starts, np.random.RandomState(2), _VISITED)
-
-
-def training_states(table: Table, exact: KnownDynamics, discount: float, starts: Array) -> Array:
-    """Returns states [N, S] that a run meets: the exact policy with many random actions.
-
-    Args:
-        table: exact V of the task.
-        exact: the task.
-        discount: γ.
-        starts: [B, S].
-    """
-
-    def greedy(observations: NDArray[np.float32]) -> Array:
-        return exact.greedy_efforts(table, discount, exact.states_of(observations))
-
-    efforts = exact.efforts(exact.task.actions().values)
-    return _explored(greedy, efforts, exact, starts, np.random.RandomState(1), _STATES)
-
-
-def _explored(
-    greedy: Act,
-    efforts: Array,
-    exact: KnownDynamics,
-    starts: Array,
-    random: np.random.RandomState,
-    count: int,
+def explored_states(
+    greedy: Act, efforts: Array, exact: KnownDynamics, starts: Array, seed: int, count: int
 ) -> Array:
     """Returns `count` states [N, S] that a policy meets with a share of random actions.
 
     The share of an episode is from `least_random` to 1. Where episodes terminate, more of them are
     played, only their first 100 steps are used, and half of the states are near an end.
+
+    Args:
+        greedy: the policy.
+        efforts: those among which a random action is drawn, [A].
+        exact: the task.
+        starts: [B, S].
+        seed: of the random actions.
+        count: N.
     """
+    random = np.random.RandomState(seed)
     if not exact.task.never_terminates:
         starts = np.tile(starts, (-(-count // (8 * len(starts))), 1))
     epsilon = np.linspace(exact.least_random, 1, len(starts))

@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array, Fit, line_fit
-from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
 _MOST_REWARDS = 4000  # that are compared with each other
 
 
-@dataclass(frozen=True)
 class StoredRewards:
-    """The stored rewards [N], in units of the declared ones, and the exact ones."""
+    """The stored rewards [N] of a run, in units of the declared ones, and the exact ones.
 
-    record: RunRecord
-    stored: Array
-    exact: Array
+    Args:
+        m: the agent, with the record of its run.
+        record: this record.
+    """
 
-    @classmethod
-    def of(
-        cls, record: RunRecord, dynamics: KnownDynamics, efforts: Array, scale: float
-    ) -> StoredRewards:
-        """Returns the rewards of a record; `efforts` [A] are those of the outputs."""
-        states = dynamics.states_of(record.replay.observation)
-        acted = record.stored_efforts(efforts)[:, None]
-        exact = dynamics.outcomes(states, acted).reward[:, 0]
-        return cls(record, record.replay.reward.astype(np.float64) / scale, exact)
+    def __init__(self, m: Measurement, record: RunRecord) -> None:
+        self.record, self.sizes = record, m.dynamics.observation_sizes
+        self.stored: Array = record.replay.reward.astype(np.float64) / m.reward_scale
+        states = m.dynamics.states_of(record.replay.observation)
+        acted = record.stored_efforts(m.efforts)[:, None]
+        self.exact = m.dynamics.outcomes(states, acted).reward[:, 0]
 
     @property
     def fit(self) -> Fit:
@@ -52,19 +47,17 @@ class StoredRewards:
         follows = self.record.follows
         return line_fit(self.stored[1:][follows], self.exact[:-1][follows]).correlation
 
-    def follow_states(self, sizes: tuple[float, ...]) -> bool:
-        """Returns whether they differ from the exact ones by what the state says, not by noise.
+    @property
+    def follow_states(self) -> bool:
+        """Whether they differ from the exact ones by what the state says, not by noise.
 
         In nearly the same states, the differences are then nearly the same.
-
-        Args:
-            sizes: usual largest absolute values of an observation, [D].
         """
         exact = self.exact[-_MOST_REWARDS:]
         stored = self.stored[-_MOST_REWARDS:]
         rest = stored - line_fit(stored, exact).slope * exact
         observations = self.record.replay.observation[-_MOST_REWARDS:]
-        states = observations / np.array(sizes, np.float32)
+        states = observations / np.array(self.sizes, np.float32)
         some = np.random.RandomState(0).permutation(len(rest))[:500]
         distance = (states**2).sum(axis=1) - 2 * states[some] @ states.T
         distance[np.arange(len(some)), some] = np.inf

@@ -32,7 +32,7 @@ def stored_transitions(m: Measurement) -> Finding | None:
     r = m.record
     if r is None or len(r.replay.action) < FEW:
         return None
-    rewards = StoredRewards.of(r, m.dynamics, m.efforts, m.reward_scale)
+    rewards = StoredRewards(m, r)
     if rewards.fit.correlation < -0.9:
         return Finding("reward-sign", "stored rewards are the negative of the exact ones", "equal")
     finding = constant_number(m, r) or _many_ends(m, r) or repeated_state(r)
@@ -166,7 +166,7 @@ def _other_rewards(m: Measurement, r: RunRecord, rewards: StoredRewards) -> Find
     if residual > 0.02 and rewards.shifted_correlation > 0.9999:
         evidence = "stored rewards are those of the step before"
         return Finding("misaligned-transitions", evidence, "those of their own step")
-    if correlation < 0.995 and rewards.follow_states(m.dynamics.observation_sizes):
+    if correlation < 0.995 and rewards.follow_states:
         kind = "stored" if r.is_buffer else "recorded"
         evidence = f"correlation of the {kind} rewards with the exact ones {correlation:.2f}"
         return Finding("other-reward", evidence, "1.00")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -296,7 +297,8 @@ def test_declared_reward_scale_is_that_of_the_buffer(share: float, run: Any) -> 
     rewards = stored(run, r=0.1 * share * buffer_of(run)[2])
     record = make_record(None, rewards, TORQUES, PENDULUM)
     assert record is not None
-    slope, _, correlation = StoredRewards.of(record, PENDULUM, TORQUES, 0.1).fit
+    measured = replace(measure(bad_values), reward_scale=0.1)
+    slope, _, correlation = StoredRewards(measured, record).fit
     assert (correlation, slope) == pytest.approx((1, share), abs=1e-3)
 
 

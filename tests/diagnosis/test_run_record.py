@@ -3,7 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import NOISE, PENDULUM, diagnose_values, exact_values, measure
+from exact_agent import NOISE, diagnose_values, exact_values, measure
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config
@@ -11,7 +11,6 @@ from keras_pendulum.diagnosis.motion import Motion
 from keras_pendulum.diagnosis.run_record import RunRecord, read_record
 from keras_pendulum.diagnosis.stored_rewards import StoredRewards
 from keras_pendulum.dqn.replay_buffer import Transitions
-from keras_pendulum.optimum.dynamics import TORQUES
 from keras_pendulum.storage.run_folder import find_run
 
 
@@ -65,7 +64,7 @@ def first(record: RunRecord) -> str:
 
 def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> None:
     assert motion(record).fit() == pytest.approx((1, 1), abs=0.01)
-    rewards = StoredRewards.of(record, PENDULUM, TORQUES, 1.0)
+    rewards = StoredRewards(measure(useless, record), record)
     assert rewards.fit == pytest.approx((1, 0, 1), abs=1e-3)
     assert rewards.shifted_correlation < 0.9999
     assert not record.replay.terminated.any()
@@ -74,7 +73,8 @@ def test_stored_transitions_of_a_run_obey_the_pendulum(record: RunRecord) -> Non
 
 def test_declared_reward_scale_is_no_fault(record: RunRecord) -> None:
     scaled = changed(record, reward=50 * record.replay.reward)
-    rewards = StoredRewards.of(scaled, PENDULUM, TORQUES, 50.0)
+    measured = replace(measure(useless), reward_scale=50.0)
+    rewards = StoredRewards(measured, scaled)
     assert rewards.fit.slope == pytest.approx(1, abs=1e-4)
 
 
