@@ -39,6 +39,13 @@ def exact_values(
     return PendulumSolution(Pendulum(gravity)).exact_q(table, discount, states, TORQUES)
 
 
+def untrained_outputs(observations: Any) -> Any:
+    """Returns small Q-values [B, 41], of which two outputs are above all others."""
+    q = 0.14 * exact_values(observations) - 1
+    q[:, [2, 4]] = 0.3
+    return q
+
+
 class ExactPolicy(Policy):
     """The greedy policy of a function from observations [B, 3] to Q-values [B, 41].
 

@@ -35,6 +35,11 @@ def _at(table: Array, corners: tuple[Array, Array]) -> Array:
     return np.asarray((table[indices] * weights[..., None]).sum(axis=0))
 
 
+def right(reward: Array, following: Array, own: Array) -> Array:
+    """Returns the targets [N, A] of the right equation."""
+    return reward + DISCOUNT * following.max(axis=2)
+
+
 @cache
 def fixed_point(
     target: Callable[[Array, Array, Array], Array], sweeps: int = 120, steps: int = 1

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import DATA
-from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
+from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point, right
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import equation_rules, policy_rules
@@ -24,10 +24,6 @@ from keras_pendulum.diagnosis.target_equations import ZERO_OTHERS
 
 LAST = len(TORQUES) - 1
 UNTRAINED = np.random.RandomState(3).normal(size=(3, 5)) * 0.1
-
-
-def right(r: Any, following: Any, own: Any) -> Any:
-    return r + DISCOUNT * following.max(axis=2)
 
 
 def diagnose(q_values: Callable[[Any], Any], **options: Any) -> kp.Diagnosis:
@@ -142,8 +138,16 @@ def test_right_program_that_has_not_converged_is_not_blamed(sweeps: int) -> None
     assert first(diagnose(fixed_point(right, sweeps))) in ("not-converged", "no finding")
 
 
-def short_training(name: str, activation: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Returns the Q-values of a network that another program has made."""
+def relu(values: Any) -> Any:
+    return np.maximum(values, 0)
+
+
+def silu(values: Any) -> Any:
+    return values / (1 + np.exp(-values))
+
+
+def short_training(name: str, activation: Callable[[Any], Any], torques: int | None) -> Any:
+    """Returns the agent of a network that another program has made."""
     with np.load(DATA / "short_trainings.npz") as arrays:
         count = sum(each.rpartition("_")[0] == name for each in arrays.files)
         weights = [arrays[f"{name}_{place}"].astype(np.float32) for place in range(count)]
@@ -153,7 +157,8 @@ def short_training(name: str, activation: Callable[[Any], Any]) -> Callable[[Any
             observations = activation(observations @ weight + bias)
         return observations @ weights[-2] + weights[-1]
 
-    return q_values
+    actions = None if torques is None else np.linspace(-2, 2, torques)
+    return kp.q_function(q_values, actions, "a student's")
 
 
 @pytest.mark.parametrize(
@@ -166,21 +171,10 @@ def test_short_training_is_not_taken_for_another_gravity(
 
     The networks have made 1900 to 2800 updates.
     """
-    function = kp.q_function(
-        short_training(name, lambda x: np.maximum(x, 0)), np.linspace(-2, 2, torques), "a student's"
-    )
-    diagnosis = kp.diagnose(function, gravity=10.0, discount=discount)
+    diagnosis = kp.diagnose(short_training(name, relu, torques), gravity=10.0, discount=discount)
     assert first(diagnosis) in ("not-converged", "no finding")
     equation, right = diagnosis.measurement.agreements[0], diagnosis.measurement.right_agreement
     assert equation[1].name == "other-gravity" and equation[0].error < 0.75 * right.error
-
-
-def relu(values: Any) -> Any:
-    return np.maximum(values, 0)
-
-
-def silu(values: Any) -> Any:
-    return values / (1 + np.exp(-values))
 
 
 @pytest.mark.parametrize(
@@ -207,15 +201,14 @@ def test_short_training_gets_the_name_of_no_part_that_is_right(
     name: str, activation: Callable[[Any], Any], torques: int | None, declared: dict[str, Any]
 ) -> None:
     """Its values are nearly the same everywhere, or near another equation, or a little above r."""
-    actions = None if torques is None else np.linspace(-2, 2, torques)
-    function = kp.q_function(short_training(name, activation), actions, "a student's")
-    assert first(kp.diagnose(function, **declared)) in ("not-converged", "no finding")
+    diagnosis = kp.diagnose(short_training(name, activation, torques), **declared)
+    assert first(diagnosis) in ("not-converged", "no finding")
 
 
 def test_target_network_of_a_program_that_never_copies_it_is_named() -> None:
     """The program multiplies the rewards by 0.02, so its first values are 50 times as large."""
-    function = kp.q_function(short_training("frozen", relu), np.linspace(-2, 2, 11), "a student's")
-    diagnosis = kp.diagnose(function, gravity=10.0, discount=0.985, reward_scale=0.02)
+    agent = short_training("frozen", relu, 11)
+    diagnosis = kp.diagnose(agent, gravity=10.0, discount=0.985, reward_scale=0.02)
     assert first(diagnosis) == "wrong-target (frozen-target)"
     assert "the values satisfy r + a number above 0 that the next state sets" in diagnosis.verdict
 
@@ -394,22 +387,27 @@ def test_next_value_of_the_action_before_fits_far_better(error: float, explains:
     assert equation.explains(Agreement(error, 0.94, 1.0, 1.0), best) is explains
 
 
-def test_target_network_that_is_never_copied_is_named() -> None:
+@pytest.mark.parametrize(
+    ("finding", "mean", "size", "waves"),
+    [
+        ("no-bootstrapping", -0.2, 0.4, 50),
+        ("no-bootstrapping", 0.2, 0.4, 50),
+        ("wrong-target (index-for-value)", 2.5, 1.2, 7),
+        ("wrong-target (index-for-value)", 1.1, 0.7, 7),
+        ("not-converged", 11, 2, 7),  # above every index
+    ],
+)
+def test_what_is_added_to_the_rewards_shows_the_target(
+    finding: str, mean: float, size: float, waves: int
+) -> None:
     values = fixed_point(TARGETS["no-bootstrapping"])
-    diagnosis = diagnose(lambda o: values(o) + 0.3 + 0.9 * (o @ UNTRAINED).max(axis=1)[:, None])
-    assert first(diagnosis) == "wrong-target (frozen-target)"
-
-
-@pytest.mark.parametrize("mean", [-0.2, 0.2])
-def test_rewards_with_an_error_have_no_constant_added(mean: float) -> None:
-    values, waves = fixed_point(TARGETS["no-bootstrapping"]), 50 * UNTRAINED
-    diagnosis = diagnose(lambda o: values(o) + mean + 0.4 * np.sin(o @ waves))
-    assert first(diagnosis) == "no-bootstrapping"
+    diagnosis = diagnose(lambda o: values(o) + mean + size * np.sin(waves * o @ UNTRAINED))
+    assert first(diagnosis) == finding
 
 
 @pytest.mark.parametrize("size", [1.0, 1.6])
 @pytest.mark.parametrize("scale", [1, 0.1, 0.02])
-def test_target_network_that_is_never_copied_is_named_with_small_rewards(
+def test_target_network_that_is_never_copied_is_named_also_with_small_rewards(
     scale: float, size: float
 ) -> None:
     values = fixed_point(TARGETS["no-bootstrapping"])
@@ -533,25 +531,18 @@ def test_mean_of_the_batch_in_all_states_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("finding", "seen"),
+    ("finding", "change"),
     [
-        ("observation-map", lambda o: o[:, [1, 0, 2]]),
-        ("observation-map", lambda o: o * np.array([1, 1, -1])),
-        ("observation-map", lambda o: o * np.array([1, 1, 180 / np.pi])),
+        ("observation-map", lambda q, o: q(o[:, [1, 0, 2]])),
+        ("observation-map", lambda q, o: q(o * np.array([1, 1, -1]))),
+        ("observation-map", lambda q, o: q(o * np.array([1, 1, 180 / np.pi]))),
+        ("torque-map", lambda q, o: q(o)[:, ::-1]),
     ],
 )
-def test_changed_observation_is_named_and_repaired(finding: str, seen: Any) -> None:
-    values = fixed_point(right)
-    diagnosis = diagnose(lambda o: values(seen(o)))
+def test_changed_observation_or_output_is_named_and_repaired(finding: str, change: Any) -> None:
+    diagnosis = diagnose(lambda o: change(fixed_point(right), o))
     assert first(diagnosis) == finding
     assert diagnosis.findings[0].repair is not None and diagnosis.findings[0].repair.regret < 100
-
-
-def test_reversed_torques_are_named_and_repaired() -> None:
-    values = fixed_point(right)
-    diagnosis = diagnose(lambda o: values(o)[:, ::-1])
-    assert first(diagnosis) == "torque-map"
-    assert diagnosis.findings[0].repair is not None
 
 
 def test_other_gravity_is_named_with_it() -> None:
@@ -573,16 +564,3 @@ def test_values_that_are_not_numbers_are_a_broken_network(kind: str) -> None:
     diagnosis = kp.diagnose(agent)
     assert first(diagnosis) == "broken-network"
     assert "not finite" in diagnosis.summary()
-
-
-@pytest.mark.parametrize(("mean", "size"), [(2.5, 1.2), (1.1, 0.7)])
-def test_index_that_changes_with_the_state_is_named(mean: float, size: float) -> None:
-    values = fixed_point(TARGETS["no-bootstrapping"])
-    diagnosis = diagnose(lambda o: values(o) + mean + size * np.sin(7 * o @ UNTRAINED))
-    assert first(diagnosis) == "wrong-target (index-for-value)"
-
-
-def test_constant_above_every_index_is_none() -> None:
-    values = fixed_point(TARGETS["no-bootstrapping"])
-    diagnosis = diagnose(lambda o: values(o) + 11 + 2 * np.sin(7 * o @ UNTRAINED))
-    assert first(diagnosis) == "not-converged"

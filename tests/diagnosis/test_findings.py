@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_agent import NOISE, diagnose_values, exact_values, measure
+from exact_agent import NOISE, diagnose_values, exact_values, measure, untrained_outputs
 
 from keras_pendulum.diagnosis.diagnose import diagnose_measurement
 from keras_pendulum.diagnosis.diagnosis import Diagnosis
@@ -22,12 +22,6 @@ def rewards(observations: Any) -> Any:
     return exact_values(observations, discount=0.0)
 
 
-def untrained_outputs(observations: Any) -> Any:
-    q = 0.14 * exact_values(observations) - 1
-    q[:, [2, 4]] = 0.3
-    return q
-
-
 def test_exact_values_give_no_finding() -> None:
     diagnosis = diagnose_values(exact_values)
     assert diagnosis.findings == diagnosis.notes == []
@@ -40,12 +34,9 @@ def test_exact_values_give_no_finding() -> None:
 @pytest.mark.parametrize(
     ("fault", "q_values"),
     [
-        ("torque-map", lambda o: exact_values(o)[:, ::-1]),
         ("torque-map", lambda o: np.roll(exact_values(o), 20, axis=1)),
         ("torque-map", lambda o: exact_values(o)[:, np.random.RandomState(3).permutation(41)]),
-        ("observation-map", lambda o: exact_values(o * np.array([1, 1, -1], np.float32))),
         ("observation-map", lambda o: exact_values(o * np.array([-1, 1, 1], np.float32))),
-        ("observation-map", lambda o: exact_values(o[:, [1, 0, 2]])),
         ("reward-sign", lambda o: -exact_values(o)),
         ("no-bootstrapping", rewards),
         ("other-discount", lambda o: exact_values(o, discount=0.5)),
@@ -68,26 +59,14 @@ def test_each_change_of_the_exact_values_is_named_first(fault: str, q_values: An
     json.dumps(diagnosis.as_json(), allow_nan=False)
 
 
-@pytest.mark.parametrize(
-    ("share", "verdict"),
-    [
-        (
-            0.4,
-            r"No finding, but regret .*: .* from the discount, and .* satisfy the right equation "
-            r"to \d+ %.* Train for longer, with a learning rate that falls\.",
-        ),
-    ],
-)
-def test_right_values_need_more_training(share: float, verdict: str) -> None:
-    diagnosis = diagnose_values(exact_values, share=share)
-    assert re.fullmatch(verdict, diagnosis.verdict)
+def test_right_values_need_more_training() -> None:
+    diagnosis = diagnose_values(exact_values, share=0.4)
     assert diagnosis.findings == []
-
-
-def test_values_of_another_gravity_are_named_with_it() -> None:
-    diagnosis = diagnose_values(exact_values, gravity=10.0)
-    assert first(diagnosis) == "other-gravity"
-    assert "g = " in diagnosis.findings[0].evidence
+    assert re.fullmatch(
+        r"No finding, but regret .*: .* from the discount, and .* satisfy the right equation "
+        r"to \d+ %.* Train for longer, with a learning rate that falls\.",
+        diagnosis.verdict,
+    )
 
 
 @pytest.mark.parametrize(
@@ -120,6 +99,7 @@ def test_finding_whose_repair_makes_the_agent_worse_is_no_note() -> None:
 
 def test_repair_shows_what_a_reversed_torque_map_costs() -> None:
     finding = diagnose_values(lambda o: exact_values(o)[:, ::-1]).findings[0]
+    assert finding.name == "torque-map"
     assert finding.repair is not None and finding.cost is not None
     assert finding.repair.regret < 2 and finding.cost > 500
 

@@ -13,7 +13,15 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
-from exact_agent import NOISE, PENDULUM, coarse_value, diagnose_values, exact_values, measure
+from exact_agent import (
+    NOISE,
+    PENDULUM,
+    coarse_value,
+    diagnose_values,
+    exact_values,
+    measure,
+    untrained_outputs,
+)
 from gymnasium.wrappers import TransformAction, TransformReward
 from recorded_runs import buffer_of, record_run, swing_up
 
@@ -242,15 +250,10 @@ def test_transitions_that_are_stored_twice_are_no_old_state(run: Any) -> None:
 
 
 def test_outputs_that_are_often_stored_are_not_called_untrained() -> None:
-    def raised(observations: Any) -> Any:
-        q = 0.14 * exact_values(observations) - 1
-        q[:, [2, 4]] = 0.3
-        return q
-
     transitions = buffer_of(record_run(epsilon=lambda done: 1.0))
     record = make_record(None, transitions, TORQUES, PENDULUM)
-    assert training_rules.untrained_outputs(measure(raised)) is not None
-    assert training_rules.untrained_outputs(measure(raised, record)) is None
+    assert training_rules.untrained_outputs(measure(untrained_outputs)) is not None
+    assert training_rules.untrained_outputs(measure(untrained_outputs, record)) is None
 
 
 @pytest.mark.parametrize("steps", [2, 4])

@@ -6,14 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point
+from fixed_points import DISCOUNT, GRAVITY, TORQUES, fixed_point, right
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import diagnose as module
-
-
-def right(r: Any, following: Any, own: Any) -> Any:
-    return r + DISCOUNT * following.max(axis=2)
 
 
 def greedy(observation: Any) -> float:
