@@ -11,13 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from keras_pendulum.diagnosis import repairs
+from keras_pendulum.diagnosis.acting_rules import SAME_ACTIONS, match_actions
 from keras_pendulum.diagnosis.backup import Agreement
 from keras_pendulum.diagnosis.equation import RIGHT, Equation, percent
 from keras_pendulum.diagnosis.faults import Fault, Finding, Repair
 from keras_pendulum.diagnosis.lasting_rules import may_last
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.rollouts import FewSteps, few_steps
-from keras_pendulum.diagnosis.stored_actions import SAME_ACTIONS, match_actions
 
 RIGHT_ERROR = 0.03  # below, no other equation is of interest
 _RIGHT_VALUES = 0.9  # correlation with the exact values

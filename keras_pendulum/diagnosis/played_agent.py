@@ -11,8 +11,7 @@ import numpy as np
 
 from keras_pendulum.config.config import Config
 from keras_pendulum.diagnosis.motion import Motion
-from keras_pendulum.diagnosis.record_observations import motion_kind
-from keras_pendulum.diagnosis.run_record import RunRecord
+from keras_pendulum.diagnosis.run_record import RunRecord, motion_kind
 from keras_pendulum.diagnosis.signals import Array
 from keras_pendulum.diagnosis.states import Act, Episodes, explored_states, simulate
 from keras_pendulum.environments.task import Task

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.diagnosis.recorded_steps import Steps
-from keras_pendulum.diagnosis.signals import Array, nearest
+from keras_pendulum.diagnosis.signals import Array, distances, nearest
 from keras_pendulum.optimum.known_dynamics import KnownDynamics
 
 PARTS = 10  # of the run, for the share of random actions
@@ -76,7 +76,8 @@ class PlayedSteps(NamedTuple):
         effort, levels = self.effort[rows], self.levels
         chance = float(np.mean(np.abs(levels[:, None] - levels) <= _CLOSE))
         compared = np.random.RandomState(0).permutation(len(rows))[:_COMPARED]
-        distance = self._distances(rows[compared], rows)
+        seen, sizes = self.steps.observation[rows], self.dynamics.observation_sizes
+        distance = distances(seen, sizes, compared)
         distance[np.abs(compared[:, None] - np.arange(len(rows))) < _SAME_TIME] = np.inf
         closest = distance.argmin(axis=1)
         follows = np.diff(rows) + np.diff(self.steps.time[rows]) == 2  # of the same environment
@@ -168,19 +169,12 @@ class PlayedSteps(NamedTuple):
         numbers = np.repeat(np.arange(len(episodes)), [each.stop - each.start for each in episodes])
         rows, numbers = rows[-2 * _ROWS :], numbers[-2 * _ROWS :]
         compared = np.random.RandomState(0).permutation(len(rows))[:_COMPARED]
-        distance = self._distances(rows[compared], rows)
+        seen, sizes = self.steps.observation[rows], self.dynamics.observation_sizes
+        distance = distances(seen, sizes, compared)
         distance[numbers[compared][:, None] == numbers] = np.inf
         same = self.effort[rows[compared]] == self.effort[rows[distance.argmin(axis=1)]]
         same_state = float(np.mean(same))
         return (same_episode, same_state) if same_state < same_episode - 0.1 else None
-
-    def _distances(self, some: NDArray[np.intp], rows: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Returns distances between states [S, N]; a number that depends on `some` is missing."""
-        states = self.steps.observation / np.array(self.dynamics.observation_sizes, np.float32)
-        distances: NDArray[np.float32] = (states[rows] ** 2).sum(axis=1) - 2 * (
-            states[some] @ states[rows].T
-        )
-        return distances
 
     def curve(self) -> Array:
         """Returns the exact return of each episode, [E], as the task's learning curves show it."""

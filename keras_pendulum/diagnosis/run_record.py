@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from keras_pendulum.config.config import Config
+from keras_pendulum.diagnosis.cartpole_motion import CartPoleMotion
+from keras_pendulum.diagnosis.motion import Motion
+from keras_pendulum.diagnosis.pendulum_motion import PendulumMotion
 from keras_pendulum.diagnosis.played_steps import PlayedSteps
-from keras_pendulum.diagnosis.record_observations import undo_change
 from keras_pendulum.diagnosis.record_sources import read_actions, steps_of, transitions_of
+from keras_pendulum.diagnosis.recorded_steps import Steps
 from keras_pendulum.diagnosis.signals import Array
+from keras_pendulum.diagnosis.states import observation_changes
 from keras_pendulum.dqn.replay_buffer import Transitions
+from keras_pendulum.errors import ConfigError
 from keras_pendulum.history import EpisodeRecord
 from keras_pendulum.optimum.known_dynamics import KnownDynamics
 from keras_pendulum.storage.recorded_run import load_recorded_run
 from keras_pendulum.storage.run_folder import RunFolder
+
+_ROWS = 5000  # whose motion shows a changed observation
+
+Recorded = TypeVar("Recorded", Steps, Transitions)
 
 
 def read_record(folder: RunFolder) -> RunRecord:
@@ -53,15 +62,45 @@ def make_record(
         if acted is None:
             assert efforts is not None
             acted = efforts[indices]
-        steps = undo_change(dynamics, steps, "record")
+        steps = _undo_change(dynamics, steps, "record")
         played, stored = PlayedSteps.of(steps, acted, efforts, dynamics), Transitions(*steps[:5])
     if transitions is not None:
-        stored = undo_change(dynamics, transitions_of(transitions, dynamics.task), "transitions")
+        stored = _undo_change(dynamics, transitions_of(transitions, dynamics.task), "transitions")
         indices, effort = read_actions(np.asarray(stored.action), efforts, "transitions")
     if efforts is None:
         own, indices = np.unique(indices, return_inverse=True)
     replay = stored._replace(action=np.asarray(indices, np.int32))
     return RunRecord(None, [], replay, played, transitions is not None, effort, own)
+
+
+def motion_kind(dynamics: KnownDynamics) -> type[Motion]:
+    """Returns the class of the motion of a task."""
+    return PendulumMotion if dynamics.any_effort else CartPoleMotion
+
+
+def _undo_change(dynamics: KnownDynamics, recorded: Recorded, name: str) -> Recorded:
+    """Returns the record with the observations [N, D] of the task.
+
+    They stay as they are where they are right, and where no change makes them obey the dynamics.
+    `name` is that of the record, for messages.
+
+    Raises ConfigError for numbers that are not those of an observation in any order, sign or unit.
+    """
+    before, action, after = (
+        each[-_ROWS:] for each in (recorded.observation, recorded.action, recorded.next_observation)
+    )
+    motion = motion_kind(dynamics)
+    identity = np.eye(before.shape[1], dtype=np.float32)
+    made: list[NDArray[Any]] = list(observation_changes(dynamics).values())
+    for change in (identity, *made, *map(np.linalg.inv, made)):
+        if motion.explains(dynamics, before @ change, action, after @ change):
+            return recorded._replace(
+                observation=recorded.observation @ change,
+                next_observation=recorded.next_observation @ change,
+            )
+    if wrong := motion.are_observations(before, after):
+        raise ConfigError(f"{name}: {wrong}; expected {motion.expected}")
+    return recorded
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,16 @@ def output_outliers(learned: Array, exact: Array) -> Array:
     return distance / max(spread, 1e-9 * (1 + np.abs(learned).max()))
 
 
+def distances(observations: Array, sizes: tuple[float, ...], some: NDArray[np.intp]) -> Array:
+    """Returns squared distances [S, N] of some observations to all of [N, D], for their order.
+
+    A number that depends on the row alone is left out. `sizes` [D] are the units.
+    """
+    states = observations / np.array(sizes, np.float32)
+    found: Array = (states**2).sum(axis=1) - 2 * (states[some] @ states.T)
+    return found
+
+
 def nearest(values: Array, torques: Array) -> NDArray[np.intp]:
     """Returns the index [N] of the torque nearest to each value [N]."""
     order = np.argsort(torques, kind="stable")

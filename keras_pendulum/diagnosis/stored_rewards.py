@@ -6,7 +6,7 @@ import numpy as np
 
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.run_record import RunRecord
-from keras_pendulum.diagnosis.signals import Array, Fit, line_fit
+from keras_pendulum.diagnosis.signals import Array, Fit, distances, line_fit
 
 _MOST_REWARDS = 4000  # that are compared with each other
 
@@ -57,8 +57,7 @@ class StoredRewards:
         stored = self.stored[-_MOST_REWARDS:]
         rest = stored - line_fit(stored, exact).slope * exact
         observations = self.record.replay.observation[-_MOST_REWARDS:]
-        states = observations / np.array(self.sizes, np.float32)
         some = np.random.RandomState(0).permutation(len(rest))[:500]
-        distance = (states**2).sum(axis=1) - 2 * states[some] @ states.T
+        distance = distances(observations, self.sizes, some)
         distance[np.arange(len(some)), some] = np.inf
         return line_fit(rest[some], rest[distance.argmin(axis=1)]).correlation > 0.5

@@ -8,8 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 from keras_pendulum.errors import UserError, report_os_error
-from keras_pendulum.exercise.hints import key_line
-from keras_pendulum.exercise.program import exercise, program
+from keras_pendulum.exercise.program import program
 from keras_pendulum.exercise.table import EXERCISES
 from keras_pendulum.storage.atomic_write import write_atomically
 
@@ -78,7 +77,7 @@ def _tasks(exercises: tuple[int, ...]) -> str:
         "Run it, look at what it prints, find the fault, and repair it. Then check it.",
     ]
     for number in exercises:
-        each, file = exercise(number), f"exercise_{number:02}.py"
+        each, file = EXERCISES[number], f"exercise_{number:02}.py"
         lines += [
             "",
             f"Exercise {number}, {each.environment}",
@@ -91,7 +90,7 @@ def _tasks(exercises: tuple[int, ...]) -> str:
 
 
 def _key(sets: list[tuple[int, ...]], seed: int) -> str:
-    dealt = sorted(set().union(*sets))
+    dealt = {number: EXERCISES[number] for number in sorted(set().union(*sets))}
     return "\n".join(
         [
             f"# Key of a class of {len(sets)}, seed {seed}",
@@ -102,7 +101,10 @@ def _key(sets: list[tuple[int, ...]], seed: int) -> str:
             "",
             "| exercise | task | finding | place | solution |",
             "|---|---|---|---|---|",
-            *map(key_line, dealt),
+            *(
+                f"| {n} | {each.environment} | {each.finding} | {each.place} | {each.solution} |"
+                for n, each in dealt.items()
+            ),
             "",
         ]
     )

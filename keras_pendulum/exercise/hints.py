@@ -1,4 +1,4 @@
-"""The texts of an exercise: the list, the task of one, its hints, and the line of the key."""
+"""The texts of an exercise: the list, the task of one, and its hints."""
 
 from __future__ import annotations
 
@@ -43,9 +43,3 @@ def hint(number: int, step: int) -> str:
         f"(docs/my_dqn_does_not_learn.md#{each.finding})",
         f"Hint 3 of 3, the solution. See {each.place}. {each.solution}",
     )[step - 1]
-
-
-def key_line(number: int) -> str:
-    """Returns the row of the teacher's key."""
-    each = exercise(number)
-    return f"| {number} | {each.environment} | {each.finding} | {each.place} | {each.solution} |"

@@ -10,7 +10,6 @@ import importlib.util
 import json
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -83,9 +82,9 @@ def _imported(path: Path) -> ModuleType:
     return module
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Runs the trial of PROGRAM with ENVIRONMENT, and writes the result to RESULT."""
-    path, environment, result = sys.argv[1:] if argv is None else argv
+    path, environment, result = sys.argv[1:]
 
     def trial() -> int:
         content = run_trial(Path(path), environment)
