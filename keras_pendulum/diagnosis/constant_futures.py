@@ -21,8 +21,63 @@ from keras_pendulum.diagnosis.target_equations import NEGATIVE_NEXT, ZERO_OTHERS
 _UNTRAINED, _UNTRAINED_SPREAD = 2.0, 0.54
 
 
+def _constant(b: Backup) -> Array:
+    return b.reward + b.offset.mean() * b.continues
+
+
+_NO_BOOTSTRAPPING = Equation(
+    "no-bootstrapping",
+    "",
+    "r",
+    lambda b: b.reward,
+    largest_error=0.15,
+    share=0.2,
+    offset=True,
+)
+_FROZEN_TARGET = Equation(
+    "wrong-target",
+    "frozen-target",
+    "r + a small constant",
+    _constant,
+    "The values are the rewards of one step plus a little that changes slowly with the next state. "
+    "That is γ·max of a network that has not learned: the target network is never copied, or the "
+    "training ended before its first copy.",
+    "Copy the online weights into the target network, every 100 to 1000 updates or a little at "
+    "each one.",
+    share=0.2,
+    offset=True,
+)
+_BATCH_MAX = Equation(
+    "wrong-target",
+    "batch-max",
+    "r + a constant",
+    _constant,
+    "The values are the rewards of one step plus a constant: the target takes one maximum for the "
+    "whole batch. So the best state of the batch follows on every state.",
+    "Give the maximum its axis: max(axis=1) of [B, A] is [B].",
+    largest_error=0.1,
+    share=0.2,
+    offset=True,
+)
+
+
+def _index_for_value(last: int, largest_error: float = 1.7, share: float = 0.88) -> Equation:
+    return Equation(
+        "wrong-target",
+        "index-for-value",
+        f"r + γ·(an index from 0 to {last})",
+        _constant,
+        "The values are the rewards of one step plus numbers between 0 and A - 1. The target adds "
+        "the index of the best next action, which argmax returns, and not its value.",
+        "Use max in the target; argmax is for acting.",
+        largest_error,
+        share,
+        offset=True,
+    )
+
+
 def constant_futures(declared: Backup) -> Iterator[Equation]:
-    """Yields the equations that Q - r shows."""
+    """Yields the equations that Q - r shows, each with `offset`."""
     highest = declared.next_q.max(axis=2)[declared.continues]
     falls = line_fit(declared.offset, highest)  # as the next values rise
     if -1.45 < falls.slope < -0.5 and falls.correlation < -0.85:
@@ -45,69 +100,25 @@ def constant_futures(declared: Backup) -> Iterator[Equation]:
     values = smooth and (rewards or float(declared.q.mean()) * scale > _UNTRAINED)
     indices = indices and (values or (declared.index_correlation > 0.4 and spread > 0.5))
     nothing = abs(float(declared.offset.mean())) < max(0.1, float(declared.offset.std()))
-    found = {
-        "no-bootstrapping": usual and not frozen and nothing,
-        "frozen-target": usual and frozen,
-        "batch-max": usual and not frozen and not indices and not nothing,
-        "index-for-value": indices,
-    }
-    positive = bool(np.mean(output > 0) > 0.85) and mean < _UNTRAINED
-    for equation in _offset_equations(declared):
-        yield replace(equation, offset=found[equation.variant or equation.name])
-        if equation.variant == "frozen-target" and not indices:
-            yield replace(
-                equation,
-                formula="r + a number above 0 that the next state sets",
-                target=lambda b: b.reward + b.offset_by_next_state.reshape(b.q.shape),
-                explanation="The values are the rewards of one step plus numbers above 0. No "
-                "reward is above 0, so no values are that have learned. These are γ·max of a "
-                "network that has not: the target network is never copied, or the training ended "
-                "before its first copy.",
-                largest_error=0.35,  # a polynomial is not all of a network
-                share=0.65,  # large numbers are a part of the next values, too
-                offset=positive,
-            )
-
-
-def _offset_equations(declared: Backup) -> Iterator[Equation]:
-    def constant(b: Backup) -> Array:
-        return b.reward + b.offset.mean() * b.continues
-
-    last = declared.q.shape[1] - 1
-    yield Equation("no-bootstrapping", "", "r", lambda b: b.reward, largest_error=0.15, share=0.2)
-    yield Equation(
-        "wrong-target",
-        "frozen-target",
-        "r + a small constant",
-        constant,
-        "The values are the rewards of one step plus a little that changes slowly with the next "
-        "state. That is γ·max of a network that has not learned: the target network is never "
-        "copied, or the training ended before its first copy.",
-        "Copy the online weights into the target network, every 100 to 1000 updates or a little at "
-        "each one.",
-        share=0.2,
-    )
-    yield Equation(
-        "wrong-target",
-        "batch-max",
-        "r + a constant",
-        constant,
-        "The values are the rewards of one step plus a constant: the target takes one maximum for "
-        "the whole batch. So the best state of the batch follows on every state.",
-        "Give the maximum its axis: max(axis=1) of [B, A] is [B].",
-        largest_error=0.1,
-        share=0.2,
-    )
-    yield Equation(
-        "wrong-target",
-        "index-for-value",
-        f"r + γ·(an index from 0 to {last})",
-        constant,
-        "The values are the rewards of one step plus numbers between 0 and A - 1. The target adds "
-        "the index of the best next action, which argmax returns, and not its value.",
-        "Use max in the target; argmax is for acting.",
-        largest_error=1.7,
-    )
+    if usual and not frozen and nothing:
+        yield _NO_BOOTSTRAPPING
+    if usual and frozen:
+        yield _FROZEN_TARGET
+    if not indices and mean < _UNTRAINED and np.mean(output > 0) > 0.85:
+        yield replace(
+            _FROZEN_TARGET,
+            formula="r + a number above 0 that the next state sets",
+            target=lambda b: b.reward + b.offset_by_next_state.reshape(b.q.shape),
+            explanation="The values are the rewards of one step plus numbers above 0. No reward is "
+            "above 0, so no values are that have learned. These are γ·max of a network that has "
+            "not: the target network is never copied, or the training ended before its first copy.",
+            largest_error=0.35,  # a polynomial is not all of a network
+            share=0.65,  # large numbers are a part of the next values, too
+        )
+    if usual and not frozen and not indices and not nothing:
+        yield _BATCH_MAX
+    if indices:
+        yield _index_for_value(last)
 
 
 def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
@@ -131,46 +142,39 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
     index = small and mean > 0 and not never_learned
     # Nothing is added at an end. After a short training, the values there are not right either.
     right_at_ends = abs(end - size) < 0.15 * size
-    for equation in _offset_equations(declared):
-        offsets = {
-            "no-bootstrapping": none,
-            "frozen-target": small and not index and right_at_ends,
-            "index-for-value": index,
-            "batch-max": mean > 2 * size and spread < 0.12 * mean and end < 0.5 * mean,
-        }
-        name = equation.variant or equation.name
-        share = max(equation.share, 0.6)
-        equation = replace(equation, offset=offsets[name], largest_error=1.6, share=share)
-        if name == "index-for-value":  # values that are nearly the same have large errors
-            equation = replace(equation, largest_error=3.0, share=0.3)
-        yield _highest_everywhere(equation) if name == "batch-max" else equation
+    if none:
+        yield replace(_NO_BOOTSTRAPPING, largest_error=1.6, share=0.6)
+    if small and not index and right_at_ends:
+        yield replace(_FROZEN_TARGET, largest_error=1.6, share=0.6)
+    if mean > 2 * size and spread < 0.12 * mean and end < 0.5 * mean:
+        yield replace(
+            _BATCH_MAX,
+            variant="batch-max or same-state",  # which has the same values where the reward is one
+            explanation="All values are nearly the highest possible one, but not those of a step "
+            "that ends the episode. Either the target takes one maximum for the whole batch, or "
+            "the values of the state itself in place of the next one.",
+            remedy="Give the maximum its axis: max(axis=1) of [B, A] is [B]. And store "
+            "(s, a, r, s′) before s = s′.",
+            largest_error=1.6,
+            share=0.5,
+        )
+    if index:  # values that are nearly the same have large errors
+        yield _index_for_value(last, largest_error=3.0, share=0.3)
     # All values are r / (1 + γ): the future of a step is this, times -γ.
     subtracted = -declared.discount / (1 + declared.discount) * size
-    yield replace(
-        NEGATIVE_NEXT,
-        target=lambda b: b.reward + subtracted,
-        largest_error=2.0,
-        offset=abs(mean / subtracted - 1) < 0.2 and spread < 0.12 * size,
-    )
+    if abs(mean / subtracted - 1) < 0.2 and spread < 0.12 * size:
+        yield replace(
+            NEGATIVE_NEXT,
+            target=lambda b: b.reward + subtracted,
+            largest_error=2.0,
+            offset=True,
+        )
     lowest, highest = float(np.quantile(declared.q.min(axis=1), 0.25)), float(declared.q.max())
-    yield replace(
-        ZERO_OTHERS,
-        formula="sum of Q(s, ·) / (r + γ·max Q(s′, ·)) = 1",
-        target=lambda b: b.q / (b.q / b.right).sum(axis=1, keepdims=True),
-        share=0.35,
-        offset=lowest < 0.9 * size and highest > 2.5 * size,
-    )
-
-
-def _highest_everywhere(equation: Equation) -> Equation:
-    """Returns `batch-max` for a constant reward: there, `same-state` has the same values."""
-    return replace(
-        equation,
-        variant="batch-max or same-state",
-        share=0.5,
-        explanation="All values are nearly the highest possible one, but not those of a step that "
-        "ends the episode. Either the target takes one maximum for the whole batch, or the values "
-        "of the state itself in place of the next one.",
-        remedy="Give the maximum its axis: max(axis=1) of [B, A] is [B]. And store (s, a, r, s′) "
-        "before s = s′.",
-    )
+    if lowest < 0.9 * size and highest > 2.5 * size:
+        yield replace(
+            ZERO_OTHERS,
+            formula="sum of Q(s, ·) / (r + γ·max Q(s′, ·)) = 1",
+            target=lambda b: b.q / (b.q / b.right).sum(axis=1, keepdims=True),
+            share=0.35,
+            offset=True,
+        )

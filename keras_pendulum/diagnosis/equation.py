@@ -33,7 +33,7 @@ class Equation:
     share: float = 0.88  # of the right equation's error that it may have at most
     flat: float = 0.0  # above 0: the advantages of Q are at most this share of the right ones
     like_short_training: bool = False  # whether right values that have not converged look like it
-    offset: bool = False  # whether it has no next values, and Q - r is as it says
+    offset: bool = False  # whether Q - r has shown it, in which it has no next values
     change: dict[str, Any] | None = None  # arguments of `changed_backup`
     label: str = ""  # what differs from the declared task
     discount: float | None = None  # γ, where it differs

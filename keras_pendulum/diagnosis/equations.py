@@ -44,11 +44,7 @@ def agreements(
         changed_backup: returns its values for another task.
     """
     ends = not agent.task.never_terminates
-    found = (
-        each
-        for each in (constant_futures_with_ends if ends else constant_futures)(declared)
-        if each.offset
-    )
+    found = (constant_futures_with_ends if ends else constant_futures)(declared)
     # With ends, `constant_futures_with_ends` finds it.
     equations = [each for each in TARGETS if not (ends and each.variant == "same-state")]
     for equation in (*equations, *found, *_changes(agent, declared)):

@@ -434,7 +434,7 @@ def named_futures(added: Any, next_q: Any, seen: Any) -> set[str]:
     reward = np.random.RandomState(1).uniform(-16, 0, added.shape)
     goes_on = np.ones(added.shape, bool)
     backup = Backup(reward + added, reward, next_q, 0.9, seen.astype(np.float32), goes_on)
-    return {each.variant or each.name for each in constant_futures(backup) if each.offset}
+    return {each.variant or each.name for each in constant_futures(backup)}
 
 
 def some_observations(count: int) -> Any:
