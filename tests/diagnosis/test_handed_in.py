@@ -27,10 +27,11 @@ from recorded_runs import buffer_of, record_run, swing_up
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis import run_rules, training_rules, transition_rules
+from keras_pendulum.diagnosis.faults import Finding
 from keras_pendulum.diagnosis.findings import RULES, find, find_in_record
 from keras_pendulum.diagnosis.played_steps import PlayedSteps
 from keras_pendulum.diagnosis.record_sources import read_actions, transitions_of
-from keras_pendulum.diagnosis.run_record import make_record
+from keras_pendulum.diagnosis.run_record import RunRecord, make_record
 from keras_pendulum.diagnosis.stored_rewards import StoredRewards
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.optimum import pendulum
@@ -72,9 +73,24 @@ ROOMS = run_rules.__name__, transition_rules.__name__
 RECORD_RULES = [rule for rule in RULES if rule.__module__ in ROOMS]
 
 
+def record_of(record: Any = None, transitions: Any = None) -> RunRecord:
+    """Returns what is handed in beside an agent of 41 torques."""
+    found = make_record(record, transitions, TORQUES, PENDULUM)
+    assert found is not None
+    return found
+
+
+def shown_by(transitions: Any) -> Finding:
+    """Returns what the transitions of a bad agent prove."""
+    measured = measure(bad_values, record_of(transitions=transitions))
+    finding = transition_rules.stored_transitions(measured)
+    assert finding is not None
+    return finding
+
+
 def first(record: Any = None, transitions: Any = None) -> str:
     """Returns what the record of a bad agent shows first."""
-    measured = measure(bad_values, make_record(record, transitions, TORQUES, PENDULUM))
+    measured = measure(bad_values, record_of(record, transitions))
     found = (rule(measured) for rule in [*RECORD_RULES, run_rules.unsteady_return])
     return next((finding.title for finding in found if finding is not None), "nothing")
 
@@ -115,9 +131,8 @@ LAYOUTS: dict[str, Callable[[Any], Any]] = {
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_layouts_of_a_replay_buffer_are_the_same(layout: str, run: Any) -> None:
-    expected = make_record(None, buffer_of(run), TORQUES, PENDULUM)
-    found = make_record(None, LAYOUTS[layout](buffer_of(run)), TORQUES, PENDULUM)
-    assert expected is not None and found is not None
+    expected = record_of(transitions=buffer_of(run))
+    found = record_of(transitions=LAYOUTS[layout](buffer_of(run)))
     for column, other in zip(found.replay, expected.replay, strict=True):
         assert np.array_equal(column, other) and column.dtype == other.dtype
 
@@ -131,10 +146,10 @@ def test_few_rows_are_not_taken_for_columns(count: int, run: Any) -> None:
     ).reward.shape == (count,)
 
 
-def broken(run: Any, place: int, value: Any) -> list[Any]:
-    columns = list(buffer_of(run))
-    columns[place] = value
-    return columns
+def stored(run: Any, **fields: Any) -> Any:
+    names = ("s", "a", "r", "next", "done")
+    columns = dict(zip(names, buffer_of(run), strict=True))
+    return [fields.get(name, columns[name]) for name in names]
 
 
 @pytest.mark.parametrize(
@@ -152,22 +167,22 @@ def broken(run: Any, place: int, value: Any) -> list[Any]:
             "a tuple of 5 with the sizes .3, 1, 3, 1, 1.",
         ),
         (
-            lambda run: broken(run, 0, np.zeros((3000, 2, 3))),
+            lambda run: stored(run, s=np.zeros((3000, 2, 3))),
             "action has the shape .3000.; expected 3000 times 1 numbers for each of 2 environments",
         ),
-        (lambda run: broken(run, 0, np.zeros((3000, 4))), "observation has the shape .3000, 4."),
-        (lambda run: broken(run, 2, np.zeros(7)), "reward has the shape .7."),
-        (lambda run: broken(run, 1, ["left"] * 3000), "action is not an array of numbers"),
-        (lambda run: broken(run, 2, np.full(3000, np.nan)), "NaN or infinite numbers"),
-        (lambda run: broken(run, 1, np.full(3000, 41)), "the actions are from 41 to 41; .*0 to 40"),
-        (lambda run: broken(run, 1, np.full(3000, 9.5)), "from 9.5 to 9.5; expected indices"),
-        (lambda run: broken(run, 4, np.full(3000, 0.5)), "done has other values than 0 and 1"),
-        (lambda run: broken(run, 0, 0.5 * buffer_of(run)[0]), r"100% .* not 1, such as 0.25"),
+        (lambda run: stored(run, s=np.zeros((3000, 4))), "observation has the shape .3000, 4."),
+        (lambda run: stored(run, r=np.zeros(7)), "reward has the shape .7."),
+        (lambda run: stored(run, a=["left"] * 3000), "action is not an array of numbers"),
+        (lambda run: stored(run, r=np.full(3000, np.nan)), "NaN or infinite numbers"),
+        (lambda run: stored(run, a=np.full(3000, 41)), "the actions are from 41 to 41; .*0 to 40"),
+        (lambda run: stored(run, a=np.full(3000, 9.5)), "from 9.5 to 9.5; expected indices"),
+        (lambda run: stored(run, done=np.full(3000, 0.5)), "done has other values than 0 and 1"),
+        (lambda run: stored(run, s=0.5 * buffer_of(run)[0]), r"100% .* not 1, such as 0.25"),
     ],
 )
 def test_wrong_transitions_are_refused_in_one_line(change: Any, message: str, run: Any) -> None:
     with pytest.raises((kp.ConfigError, TypeError), match=message) as caught:
-        make_record(None, change(run), TORQUES, PENDULUM)
+        record_of(transitions=change(run))
     assert "\n" not in str(caught.value)
 
 
@@ -190,14 +205,8 @@ def test_indices_and_torques_are_told_apart(actions: Any, torques: Any, indices:
 
 def test_right_run_of_a_bad_agent_gets_no_fault(run: Any) -> None:
     assert first(run, buffer_of(run)) == "nothing"
-    record = make_record(run, buffer_of(run), TORQUES, PENDULUM)
-    assert diagnose_values(bad_values, record).findings[0].name == "not-converged"
-
-
-def stored(run: Any, **fields: Any) -> Any:
-    names = ("s", "a", "r", "next", "done")
-    columns = dict(zip(names, buffer_of(run), strict=True))
-    return [np.asarray(fields.get(name, columns[name])) for name in names]
+    diagnosis = diagnose_values(bad_values, record_of(run, buffer_of(run)))
+    assert diagnosis.findings[0].name == "not-converged"
 
 
 def greedy(run: Any, share: float) -> Any:
@@ -250,8 +259,7 @@ def test_transitions_that_are_stored_twice_are_no_old_state(run: Any) -> None:
 
 
 def test_outputs_that_are_often_stored_are_not_called_untrained() -> None:
-    transitions = buffer_of(record_run(epsilon=lambda done: 1.0))
-    record = make_record(None, transitions, TORQUES, PENDULUM)
+    record = record_of(transitions=buffer_of(record_run(epsilon=lambda done: 1.0)))
     assert training_rules.untrained_outputs(measure(untrained_outputs)) is not None
     assert training_rules.untrained_outputs(measure(untrained_outputs, record)) is None
 
@@ -283,23 +291,14 @@ def test_wrapper_that_repeats_each_action_is_no_fault(environment: str, steps: i
 
 
 def test_constant_that_is_added_to_the_stored_rewards_is_named(run: Any) -> None:
-    measured = measure(
-        bad_values,
-        make_record(None, stored(run, r=buffer_of(run)[2] / 8 + 1), TORQUES, PENDULUM),
-    )
-    finding = transition_rules.stored_transitions(measured)
-    assert (
-        finding is not None
-        and finding.evidence == "stored rewards 0.125 times the declared ones plus 1"
-    )
+    finding = shown_by(stored(run, r=buffer_of(run)[2] / 8 + 1))
+    assert finding.evidence == "stored rewards 0.125 times the declared ones plus 1"
     assert "Leave the constant out" in finding.remedy
 
 
 @pytest.mark.parametrize("share", [0.8, 1.2])
 def test_declared_reward_scale_is_that_of_the_buffer(share: float, run: Any) -> None:
-    rewards = stored(run, r=0.1 * share * buffer_of(run)[2])
-    record = make_record(None, rewards, TORQUES, PENDULUM)
-    assert record is not None
+    record = record_of(transitions=stored(run, r=0.1 * share * buffer_of(run)[2]))
     measured = replace(measure(bad_values), reward_scale=0.1)
     slope, _, correlation = StoredRewards(measured, record).fit
     assert (correlation, slope) == pytest.approx((1, share), abs=1e-3)
@@ -371,8 +370,7 @@ def test_actions_that_answer_the_first_observation_are_an_old_state() -> None:
 def test_other_observations_of_the_buffer_are_understood(change: Any, run: Any) -> None:
     """The agent may change them itself, so only the rest is judged."""
     s, a, r, after, done = buffer_of(run)
-    record = make_record(None, (change(s), a, r, change(after), done), TORQUES, PENDULUM)
-    assert record is not None
+    record = record_of(transitions=(change(s), a, r, change(after), done))
     assert record.replay.observation == pytest.approx(s, abs=1e-6)
     assert measure(bad_values, record).motion.obeying() > 0.99
 
@@ -529,8 +527,4 @@ def test_torques_of_a_program_are_cut_as_the_pendulum_does(actions: Any, torques
 
 
 def test_ends_that_may_be_a_mask_are_said_to_be(run: Any) -> None:
-    measured = measure(
-        bad_values, make_record(None, broken(run, 4, np.ones(3000)), TORQUES, PENDULUM)
-    )
-    finding = transition_rules.stored_transitions(measured)
-    assert finding is not None and "1 - done" in finding.evidence
+    assert "1 - done" in shown_by(stored(run, done=np.ones(3000))).evidence
