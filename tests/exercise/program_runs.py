@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from keras_pendulum.exercise.program import program
-from keras_pendulum.exercise.table import PENDULUM
+from keras_pendulum.exercise.check import answer
+from keras_pendulum.exercise.program import exercise, program
 from keras_pendulum.exercise.trial import run_trial
 
 
@@ -17,6 +17,10 @@ def result_of(text: str, environment: str, steps: int, folder: Path) -> dict[str
     return run_trial(path, environment, steps)
 
 
-def healthy_program(environment: str) -> str:
-    """Returns the program without a fault, for an environment."""
-    return program(0).replace(f'ENVIRONMENT = "{PENDULUM}"', f'ENVIRONMENT = "{environment}"')
+def assert_fault_is_named(number: int, steps: int, folder: Path) -> None:
+    each = exercise(number)
+    result = result_of(program(number), each.environment, steps, folder)
+    assert result["findings"][0]["name"] == each.finding, result["verdict"]
+    healthy, text = answer(number, result)
+    assert not healthy
+    assert f"\n1. {each.finding}" in text
