@@ -87,8 +87,12 @@ def diagnose(
         agent = q_function(agent, name="DQN")  # no policy, but its values can be diagnosed
     source = agent if folder is None else folder.weights
     policy = as_policy(source, torques, environment=environment)
-    unknown = gravity is None and policy.info.task is None
-    if unknown and policy.has_q_values and not _are_finite(policy):
+    if (
+        gravity is None
+        and policy.info.task is None
+        and policy.has_q_values
+        and not np.isfinite(policy.q_values(_upright(policy.task))).all()
+    ):
         gravity = USUAL_GRAVITIES[0]  # no task can be found by playing
     task, assumption = find_task(policy, gravity)
     dynamics = solution(task)
@@ -138,10 +142,6 @@ def diagnose(
 def _upright(task: Task) -> NDArray[np.float32]:
     """Returns an observation [1, D]."""
     return np.eye(1, task.observation_size, dtype=np.float32)
-
-
-def _are_finite(policy: Policy) -> bool:
-    return bool(np.isfinite(policy.q_values(_upright(policy.task))).all())
 
 
 def _has_random_values(policy: Policy) -> bool:

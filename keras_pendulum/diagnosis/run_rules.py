@@ -11,7 +11,7 @@ from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.played_steps import BEGINNING, PARTS
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.diagnosis.stored_states import OLD_STATE
+from keras_pendulum.diagnosis.stored_transitions import OLD_STATE
 
 _LOW = 0.08  # random actions that an ε of 0.1 shows at least
 _FALLS = 0.3  # above: the run begins with random actions, also where each lasts for some steps

@@ -14,8 +14,8 @@ from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.motion import FEW
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array
-from keras_pendulum.diagnosis.stored_rewards import StoredRewards
-from keras_pendulum.diagnosis.stored_states import (
+from keras_pendulum.diagnosis.stored_transitions import (
+    StoredRewards,
     constant_number,
     has_several_steps,
     repeated_state,

@@ -32,7 +32,7 @@ from keras_pendulum.diagnosis.findings import RULES, find, find_in_record
 from keras_pendulum.diagnosis.played_steps import PlayedSteps
 from keras_pendulum.diagnosis.record_sources import read_actions, transitions_of
 from keras_pendulum.diagnosis.run_record import RunRecord, make_record
-from keras_pendulum.diagnosis.stored_rewards import StoredRewards
+from keras_pendulum.diagnosis.stored_transitions import StoredRewards
 from keras_pendulum.environments.pendulum import Pendulum
 from keras_pendulum.optimum import pendulum
 from keras_pendulum.optimum.dynamics import TORQUES

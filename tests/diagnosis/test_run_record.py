@@ -9,7 +9,7 @@ import keras_pendulum as kp
 from keras_pendulum.config.config import Config
 from keras_pendulum.diagnosis.motion import Motion
 from keras_pendulum.diagnosis.run_record import RunRecord, read_record
-from keras_pendulum.diagnosis.stored_rewards import StoredRewards
+from keras_pendulum.diagnosis.stored_transitions import StoredRewards
 from keras_pendulum.dqn.replay_buffer import Transitions
 from keras_pendulum.storage.run_folder import find_run
 
