@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from keras_pendulum.diagnosis.faults import FAULTS, Fault, Finding
+from keras_pendulum.diagnosis.faults import Fault, Finding
 from keras_pendulum.diagnosis.measurement import Measurement
 from keras_pendulum.diagnosis.run_record import RunRecord
 from keras_pendulum.diagnosis.signals import Array, Fit, distances, line_fit
@@ -16,7 +16,6 @@ OLD_STATE = Fault(
     "The state is not updated: each action of an episode is chosen at its first state. So the "
     "network sees one state of each episode.",
     "Set the state to the next state at the end of each step.",
-    ("too-few-updates", "narrow-starts", "torque-map", "observation-map"),
 )
 
 
@@ -86,7 +85,6 @@ def constant_number(m: Measurement, r: RunRecord) -> Finding | None:
             "A part of the observation is lost before it is stored. So the network cannot learn "
             "what depends on it.",
             "Store the observation as the environment gives it, and print some of its rows.",
-            (*FAULTS["observation-map"].explains, "torque-map", "misaligned-transitions"),
         ),
         proven=True,
     )
@@ -106,7 +104,6 @@ def repeated_state(r: RunRecord) -> Finding | None:
                 "The next state is stored as the state itself, so no action has a consequence.",
                 "Store (s, a, r, s′) before s = s′, and copy the observation where the environment "
                 "changes it in place.",
-                ("too-few-updates", "wrong-target"),
             ),
         )
     # A transition that is stored twice is no mistake.

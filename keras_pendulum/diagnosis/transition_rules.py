@@ -115,7 +115,6 @@ def _other_actions(m: Measurement, r: RunRecord) -> Finding | None:
                     "The greedy action is stored where a random one acted. So its value is learned "
                     "from the result of another action.",
                     "Store the action that was given to the environment.",
-                    ("too-few-updates", "torque-map", "narrow-starts"),
                 ),
             )
     return Finding("misaligned-transitions", f"{part}one", "none") if wrong.mean() > 0.1 else None
@@ -192,7 +191,6 @@ def forgetting(m: Measurement) -> Finding | None:
                 "forgets the rest of the plane.",
                 "Store the transitions in a replay buffer of at least 14 000, and draw each batch "
                 "at random.",
-                ("narrow-starts", "too-few-updates"),
             ),
         )
     if r.steps is not None and r.steps >= 3 * stored and stored < small:

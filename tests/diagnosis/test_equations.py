@@ -242,17 +242,11 @@ def test_values_that_grow_without_bound_are_not_those_of_large_rewards() -> None
     assert first(diagnose(lambda o: 1e5 * np.sin(40 * o @ UNTRAINED) - 1e6)) == "broken-network"
 
 
-@pytest.mark.parametrize("size", [0.5, 1.0, 2.0, 4.0])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_right_values_with_an_error_are_not_blamed(size: float, seed: int) -> None:
-    values, waves = fixed_point(right), np.random.RandomState(seed).normal(size=(3, 5))
-    diagnosis = diagnose(lambda o: values(o) + size * np.sin(2 * o @ waves))
-    assert first(diagnosis) in ("not-converged", "no finding")
-
-
-def rough(target: Callable[..., Any], size: float, waves: int) -> Callable[[Any], Any]:
+def rough(
+    target: Callable[..., Any], size: float, waves: int, seed: int = 0
+) -> Callable[[Any], Any]:
     """Returns the values of a target with an error that differs from state to state."""
-    values, directions = fixed_point(target), np.random.RandomState(0).normal(size=(3, 5))
+    values, directions = fixed_point(target), np.random.RandomState(seed).normal(size=(3, 5))
     return lambda o: values(o) + size * np.sin(waves * o @ directions)
 
 
@@ -320,10 +314,10 @@ def test_one_of_two_targets_that_fit_alike_is_named_where_the_right_one_fits_far
     assert (followed_policy(m) is not None) is named
 
 
-@pytest.mark.parametrize("waves", [2, 4, 8])
-@pytest.mark.parametrize("size", [1, 4])
-def test_right_values_with_a_rough_error_follow_no_other_policy(size: float, waves: int) -> None:
-    assert first(diagnose(rough(right, size, waves))) in ("not-converged", "no finding")
+@pytest.mark.parametrize(("waves", "seed"), [(2, 0), (2, 1), (4, 0), (8, 0)])
+@pytest.mark.parametrize("size", [0.5, 1, 2, 4])
+def test_right_values_with_an_error_are_not_blamed(size: float, waves: int, seed: int) -> None:
+    assert first(diagnose(rough(right, size, waves, seed))) in ("not-converged", "no finding")
 
 
 @pytest.mark.parametrize(
