@@ -18,10 +18,6 @@ def first(diagnosis: Diagnosis) -> str:
     return diagnosis.findings[0].name if diagnosis.findings else "no finding"
 
 
-def rewards(observations: Any) -> Any:
-    return exact_values(observations, discount=0.0)
-
-
 def test_exact_values_give_no_finding() -> None:
     diagnosis = diagnose_values(exact_values)
     assert diagnosis.findings == diagnosis.notes == []
@@ -37,9 +33,6 @@ def test_exact_values_give_no_finding() -> None:
         ("torque-map", lambda o: np.roll(exact_values(o), 20, axis=1)),
         ("torque-map", lambda o: exact_values(o)[:, np.random.RandomState(3).permutation(41)]),
         ("observation-map", lambda o: exact_values(o * np.array([-1, 1, 1], np.float32))),
-        ("reward-sign", lambda o: -exact_values(o)),
-        ("no-bootstrapping", rewards),
-        ("other-discount", lambda o: exact_values(o, discount=0.5)),
         ("untrained-outputs", untrained_outputs),
         ("not-converged", lambda o: np.tanh(o @ NOISE) + 0.01 * exact_values(o)),
         ("reward-scale", lambda o: 1e-6 * np.tanh(o @ NOISE) + 1e-5 * exact_values(o)[:, :1]),

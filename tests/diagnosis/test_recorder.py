@@ -43,20 +43,14 @@ def assert_same(steps: Steps, rows: list[Any]) -> None:
         assert np.array_equal(column, np.array(expected).reshape(column.shape).astype(column.dtype))
 
 
-def test_recorder_stores_what_the_environment_returns() -> None:
-    env = kp.Recorder(gymnasium.make("Pendulum-v1", max_episode_steps=30))
+def test_recorder_stores_what_the_environment_returns_and_changes_nothing() -> None:
     actions = np.random.RandomState(0).uniform(-2, 2, (100, 1)).astype(np.float32)
-    rows = play(env, actions)
-    assert_same(env.steps, rows)
-    assert env.steps.total == 100 and env.steps.truncated.sum() == 3 and env.steps.first.sum() == 4
-
-
-def test_recorder_changes_nothing() -> None:
-    actions = np.random.RandomState(0).uniform(-2, 2, (50, 1)).astype(np.float32)
     plain = play(gymnasium.make("Pendulum-v1", max_episode_steps=30), actions)
     env = kp.Recorder(gymnasium.make("Pendulum-v1", max_episode_steps=30))
     for row, expected in zip(play(env, actions), plain, strict=True):
         assert all(np.array_equal(a, b) for a, b in zip(row, expected, strict=True))
+    assert_same(env.steps, plain)
+    assert env.steps.total == 100 and env.steps.truncated.sum() == 3 and env.steps.first.sum() == 4
     assert isinstance(env, gymnasium.Wrapper) and isinstance(env.unwrapped, PendulumEnv)
 
 
