@@ -119,10 +119,10 @@ class Diagnosis:
         return draw_diagnosis(self.measurement, self.findings, self.notes)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Returns the state for pickle: everything is measured, and the agent's code left out."""
+        """Returns the state for pickle: everything is measured."""
         self.figure()
         self.as_json()
-        return {**vars(self), "measurement": self.measurement.without_code()}
+        return vars(self)
 
 
 def _signals(m: Measurement) -> dict[str, float]:

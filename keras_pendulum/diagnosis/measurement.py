@@ -6,7 +6,7 @@ import copy
 import pickle
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,18 +34,17 @@ class LastingAction(NamedTuple):
 class Measurement(PlayedAgent):
     """The signals of an agent; those of Q-values are only there where the policy has them."""
 
-    def without_code(self) -> Measurement:
-        """Returns a copy whose policy has no part that pickle refuses, such as a local function."""
-        copied, policy = copy.copy(self), copy.copy(self.policy)
-        vars(copied)["on_episodes"] = no_report
-        vars(copied).pop("agreements", None)  # they hold functions
+    def __getstate__(self) -> dict[str, Any]:
+        """Returns the state for pickle, without what it refuses, such as a local function."""
+        policy = copy.copy(self.policy)
         for name, value in vars(policy).items():
             try:
                 pickle.dumps(value)
             except Exception:  # which one depends on the value
                 setattr(policy, name, None)
-        vars(copied)["policy"] = policy
-        return copied
+        state = {**vars(self), "policy": policy, "on_episodes": no_report}
+        state.pop("agreements", None)  # they hold functions
+        return state
 
     def act(self, observations: Observations) -> Array:
         """Returns the efforts [B] in N·m or N; values that are not finite have efforts too."""
