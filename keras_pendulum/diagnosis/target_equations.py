@@ -18,7 +18,20 @@ def _next(values: Callable[[Array], Array]) -> Callable[[Backup], Array]:
 
 _TARGET = "Its fixed point has other values, so the greedy policy follows another task."
 _TAKE_MAXIMUM = "Take the maximum over the actions: axis 1 of [B, A], of the next state's values."
-_FIXED = 0.72  # values that have not converged fit a fixed action, too, but not so much better
+
+
+def _fixed_action_next(word: str, index: int) -> Equation:
+    return Equation(
+        "wrong-target",
+        "fixed-action-next",
+        f"r + γ·Q(s′, {word} action)",
+        _next(lambda q: q[:, :, index]),
+        f"The target takes the value of the {word} action, whatever the next state is. {_TARGET}",
+        f"{_TAKE_MAXIMUM} An index [{index}] in place of max does this.",
+        share=0.72,  # values that have not converged fit it, too, but not so much better
+        next_action=lambda q, random: np.full(len(q), index % q.shape[1]),
+    )
+
 
 ZERO_OTHERS = Equation(
     "wrong-loss",
@@ -67,26 +80,8 @@ TARGETS = (
         f"{_TAKE_MAXIMUM} Of costs take the minimum, but then act by the lowest value, too.",
         next_action=lambda q, random: q.argmin(axis=1),
     ),
-    Equation(
-        "wrong-target",
-        "fixed-action-next",
-        "r + γ·Q(s′, first action)",
-        _next(lambda q: q[:, :, 0]),
-        f"The target takes the value of the first action, whatever the next state is. {_TARGET}",
-        f"{_TAKE_MAXIMUM} An index [0] in place of max does this.",
-        share=_FIXED,
-        next_action=lambda q, random: np.zeros(len(q), np.intp),
-    ),
-    Equation(
-        "wrong-target",
-        "fixed-action-next",
-        "r + γ·Q(s′, last action)",
-        _next(lambda q: q[:, :, -1]),
-        f"The target takes the value of the last action, whatever the next state is. {_TARGET}",
-        f"{_TAKE_MAXIMUM} An index [-1] in place of max does this.",
-        share=_FIXED,
-        next_action=lambda q, random: np.full(len(q), q.shape[1] - 1),
-    ),
+    _fixed_action_next("first", 0),
+    _fixed_action_next("last", -1),
     Equation(
         "wrong-target",
         "same-action-next",
