@@ -18,8 +18,6 @@ _SAME_STATE = 1e-3  # m, m/s, rad or rad/s
 class CartPoleMotion(Motion):
     """The motion of CartPole: only one of the two pushes leads to the next state."""
 
-    expected = "[x, ẋ, θ, θ̇] of CartPole-v1, without normalisation"
-
     @cached_property
     def errors(self) -> Array:
         """The largest difference [N, A] of the next state to that of each effort."""
@@ -36,14 +34,17 @@ class CartPoleMotion(Motion):
         return bool(np.mean(errors.min(axis=1) < _SAME_STATE) >= 0.95)
 
     @classmethod
-    def are_observations(cls, before: Array, after: Array) -> str:
+    def wrong_observations(cls, before: Array, after: Array) -> str:
         """Returns what is wrong where the position grows by another multiple of the speed."""
         fit = line_fit((after - before)[:, 0], before[:, 1])
         steps = fit.slope / 0.02  # of one transition: a wrapper may repeat each action
         repeats = steps > 1.5 and abs(steps - round(steps)) < 0.1
         if fit.correlation < 0.99 or abs(fit.slope - 0.02) < 1e-3 or repeats:
             return ""
-        return f"a position that changes by {fit.slope:.3g} times the speed in a step, not by 0.02"
+        return (
+            f"a position that changes by {fit.slope:.3g} times the speed in a step, not by 0.02; "
+            "expected [x, ẋ, θ, θ̇] of CartPole-v1, without normalisation"
+        )
 
     def obeying(self) -> float:
         """Returns the share whose next state follows from the stored action."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,6 @@ class Motion(ABC):
         efforts: those of the outputs, [A].
     """
 
-    expected: ClassVar[str]  # says what the observations are
-
     def __init__(
         self, dynamics: KnownDynamics, replay: Transitions, stored: Array, efforts: Array
     ) -> None:
@@ -55,8 +53,8 @@ class Motion(ABC):
 
     @classmethod
     @abstractmethod
-    def are_observations(cls, before: Array, after: Array) -> str:
-        """Returns an empty text; for observations of another kind, what is wrong with them."""
+    def wrong_observations(cls, before: Array, after: Array) -> str:
+        """Returns an empty text; for observations of another kind, what is wrong and expected."""
 
     @abstractmethod
     def obeying(self) -> float:

@@ -25,8 +25,6 @@ class PendulumMotion(Motion):
     It shows it wherever the speed is below its limit.
     """
 
-    expected = "[cos θ, sin θ, θ̇] of Pendulum-v1, without normalisation"
-
     def __init__(
         self, dynamics: KnownDynamics, replay: Transitions, stored: Array, efforts: Array
     ) -> None:
@@ -42,7 +40,7 @@ class PendulumMotion(Motion):
         cls, dynamics: KnownDynamics, before: Array, action: NDArray[Any], after: Array
     ) -> bool:
         """Returns whether angle and speed fit together, and the acceleration fits the torques."""
-        if cls.are_observations(before, after):
+        if cls.wrong_observations(before, after):
             return False
         (theta, speed), (next_theta, next_speed) = map(
             np.transpose, map(dynamics.states_of, (before, after))
@@ -61,7 +59,7 @@ class PendulumMotion(Motion):
         return bool(len(error) and solution[0] > 0 and np.median(error) < _SMALL)
 
     @classmethod
-    def are_observations(cls, before: Array, after: Array) -> str:
+    def wrong_observations(cls, before: Array, after: Array) -> str:
         """Returns what is wrong unless cos² + sin² is 1."""
         squares = (before[:, :2].astype(np.float64) ** 2).sum(axis=1)
         wrong = np.abs(squares - 1) >= 1e-3
@@ -69,7 +67,8 @@ class PendulumMotion(Motion):
             return ""
         return (
             f"{wrong.mean():.0%} of the observations have a cos² + sin² that is not 1, such as "
-            f"{squares[wrong][-1]:.3g}"
+            f"{squares[wrong][-1]:.3g}; expected [cos θ, sin θ, θ̇] of Pendulum-v1, without "
+            "normalisation"
         )
 
     def obeying(self) -> float:

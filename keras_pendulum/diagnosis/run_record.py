@@ -98,8 +98,8 @@ def _undo_change(dynamics: KnownDynamics, recorded: Recorded, name: str) -> Reco
                 observation=recorded.observation @ change,
                 next_observation=recorded.next_observation @ change,
             )
-    if wrong := motion.are_observations(before, after):
-        raise ConfigError(f"{name}: {wrong}; expected {motion.expected}")
+    if wrong := motion.wrong_observations(before, after):
+        raise ConfigError(f"{name}: {wrong}")
     return recorded
 
 

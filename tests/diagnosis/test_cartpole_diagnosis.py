@@ -197,7 +197,7 @@ def test_wrapper_that_repeats_each_action_is_no_normalisation(slope: float, acce
     """Of 2 and 4 steps, the speed changes a little on the way."""
     before = np.random.RandomState(0).normal(size=(500, 4))
     after = before + np.outer(before[:, 1], [slope, 0, 0, 0])
-    assert (CartPoleMotion.are_observations(before, after) == "") is accepted
+    assert (CartPoleMotion.wrong_observations(before, after) == "") is accepted
 
 
 @pytest.mark.parametrize(("noise", "named"), [(3.0, True), (15.0, False)])
