@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -74,9 +73,13 @@ def frozen_values(mean: float, slope: float) -> Any:
     return values
 
 
-def first(values: Any, **options: Any) -> str:
+def diagnose(values: Any, discount: float = 0.95, **options: Any) -> kp.Diagnosis:
     agent = kp.q_function(lambda o: values(o[:, :4]), name="agent")
-    found = kp.diagnose(agent, environment="CartPole-v1", discount=0.95, **options).findings
+    return kp.diagnose(agent, environment="CartPole-v1", discount=discount, **options)
+
+
+def first(values: Any, **options: Any) -> str:
+    found = diagnose(values, **options).findings
     return found[0].title if found else "no finding"
 
 
@@ -121,16 +124,10 @@ def test_bounded_head_is_named_and_small_values_are_not(head: str, least: float)
     assert not first(values).startswith("bounded-output")
 
 
-def small_values(weights: Any, observations: Any) -> Any:
-    return 0.02 * np.tanh(observations @ weights)
-
-
 def test_rewards_of_nearly_no_size_have_no_sign() -> None:
     formulas = []
     for weights in (-WEIGHTS, WEIGHTS):
-        agent = kp.q_function(partial(small_values, weights))
-        found = kp.diagnose(agent, environment="CartPole-v1", discount=0.95).measurement
-        assert found is not None
+        found = diagnose(lambda o, own=weights: 0.02 * np.tanh(o @ own)).measurement
         formulas += [each.formula for _, each in found.agreements if each.name == "reward-scale"]
     assert formulas and not any(each.startswith("-") for each in formulas)
 
@@ -205,6 +202,5 @@ def test_grown_values_that_satisfy_no_equation_are_no_missing_end(
     noise: float, named: bool
 ) -> None:
     """They satisfy the one without ends to 34 % or to 102 %."""
-    function = kp.q_function(lambda o: 600 + noise * np.sin(3 * o @ WEIGHTS))
-    found = kp.diagnose(function, environment="CartPole-v1", discount=0.99).findings
-    assert (found[0].name == "missing-end") is named
+    found = first(lambda o: 600 + noise * np.sin(3 * o @ WEIGHTS), discount=0.99)
+    assert (found == "missing-end") is named
