@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from keras_pendulum.config.fields import SEED, Integer, Integers, Number, Switch, Text, setting
 from keras_pendulum.environments.tasks import TASKS
 
-_WITH_TORQUES = ("environment", "Pendulum-v1")
+_WITH_TORQUES = (
+    "environment",
+    *(name for name, task in TASKS.items() if "torque_count" in task.own_settings),
+)
 
 
 @dataclass(frozen=True)

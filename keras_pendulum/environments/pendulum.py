@@ -45,6 +45,7 @@ class Pendulum(Task):
     seconds_per_step: ClassVar[float] = 0.05
     weights_name: ClassVar[str] = "pendulum_weight.h5"
     usual_discount: ClassVar[float] = 0.9
+    own_settings: ClassVar[tuple[str, ...]] = ("gravity", "torque_count", "stored_index")
     curve_column: ClassVar[str] = "average_reward"
     curve_label: ClassVar[str] = "Reward per step"
 

@@ -32,6 +32,7 @@ class Task(ABC):
     seconds_per_step: ClassVar[float]
     weights_name: ClassVar[str]  # file name of a run's checkpoint
     usual_discount: ClassVar[float] = 0.99  # γ, for an agent that records none
+    own_settings: ClassVar[tuple[str, ...]] = ()  # settings of a Config that only this task has
     curve_column: ClassVar[str] = "episode_return"  # of history.csv, for learning curves
     curve_label: ClassVar[str] = "Return (steps)"
 

@@ -6,11 +6,12 @@ import dataclasses
 import re
 from typing import Any
 
+import numpy as np
 import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.config.config import Config, Recording
-from keras_pendulum.config.fields import Integers, Number, Only, Text, kind_of
+from keras_pendulum.config.fields import Integer, Integers, Number, Only, Text, kind_of
 from keras_pendulum.config.settings import read_settings
 
 # The lowest and the highest value of each number.
@@ -49,6 +50,25 @@ def test_numbers_have_the_limits_of_this_file() -> None:
     kinds = {spec.name: kind_of(spec) for spec in dataclasses.fields(Config)}
     numbers = {name: kind for name, kind in kinds.items() if isinstance(kind, Number | Integers)}
     assert {name: (kind.low, kind.high) for name, kind in numbers.items()} == LIMITS
+
+
+@pytest.mark.parametrize("kind", [Number(1, 10), Integer(1, 10)])
+def test_limits_are_accepted_and_the_next_number_is_refused(kind: Number) -> None:
+    assert (kind.validate("tau", 1), kind.validate("tau", 10)) == (1, 10)
+    refused = [0, 11] if isinstance(kind, Integer) else np.nextafter([1, 10], [0, 11]).tolist()
+    for value in refused:
+        with pytest.raises(kp.ConfigError, match=r"^tau is .*; expected a .*number from 1 to 10"):
+            kind.validate("tau", value)
+
+
+def test_1_and_16_hidden_layers_of_1_to_8192_units_are_accepted() -> None:
+    accepted: list[tuple[int, ...]] = [(1,), (8192,), (8,) * 16]
+    for units in accepted:
+        assert kp.preset("reference", hidden_units=units).hidden_units == units
+    refused: list[tuple[int, ...]] = [(), (0,), (8193,), (8,) * 17]
+    for units in refused:
+        with pytest.raises(kp.ConfigError, match=r"^hidden_units is .*; expected "):
+            kp.preset("reference", hidden_units=units)
 
 
 @pytest.mark.parametrize("spec", dataclasses.fields(Config), ids=lambda spec: spec.name)

@@ -466,7 +466,8 @@ def test_each_action_may_last_for_some_steps(lasting: int, epsilon: float) -> No
 
 def test_usual_actions_do_not_last() -> None:
     for run in record_run(), record_run(episodes=50, epsilon=lambda done: 0.0):
-        assert PlayedSteps.of(run.steps, TORQUES, PENDULUM).action_steps() == 1
+        played = PlayedSteps.of(run.steps, run.steps.action, TORQUES, PENDULUM)
+        assert played.action_steps() == 1
 
 
 def test_record_may_be_a_file_and_on_the_command_line(
