@@ -9,6 +9,7 @@ import pytest
 
 import keras_pendulum as kp
 from keras_pendulum.diagnosis.cartpole_motion import CartPoleMotion
+from keras_pendulum.diagnosis.findings import find
 from keras_pendulum.diagnosis.transition_rules import truncation_as_end
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.optimum.cartpole import CartPoleSolution
@@ -73,6 +74,20 @@ def frozen_values(mean: float, slope: float) -> Any:
     return values
 
 
+def values_of_lasting_pushes(observations: Any, steps: int = 3, discount: float = 0.9) -> Any:
+    """Returns Q-values where each push lasts for some steps; later ones balance the pole."""
+    outcomes = EXACT.lasting_outcomes(observations.astype(float), FORCES, steps)
+    q, state, ended = outcomes.reward, outcomes.state.reshape(-1, 4), outcomes.terminated.ravel()
+    for number in range(steps, 40 * steps):
+        if number % steps == 0:
+            force = 10 * np.sign(state @ [0.1, 0.4, 3.0, 1.0])[:, None]
+        q = q + discount ** (number // steps) * ~ended.reshape(q.shape)
+        step = EXACT.outcomes(state, force)
+        state = np.where(ended[:, None], state, step.state[:, 0])
+        ended = ended | step.terminated[:, 0]
+    return q
+
+
 def diagnose(values: Any, discount: float = 0.95, **options: Any) -> kp.Diagnosis:
     agent = kp.q_function(lambda o: values(o[:, :4]), name="agent")
     return kp.diagnose(agent, environment="CartPole-v1", discount=discount, **options)
@@ -81,6 +96,11 @@ def diagnose(values: Any, discount: float = 0.95, **options: Any) -> kp.Diagnosi
 def first(values: Any, **options: Any) -> str:
     found = diagnose(values, **options).findings
     return found[0].title if found else "no finding"
+
+
+def test_values_of_pushes_that_last_are_no_overestimation() -> None:
+    found = find(diagnose(values_of_lasting_pushes, discount=0.9).measurement)
+    assert [each.title for each in found] == ["not-converged (lasting-actions)"]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,9 @@ import pytest
 import keras_pendulum as kp
 from keras_pendulum.environments.cartpole import CartPole
 from keras_pendulum.environments.pendulum import Pendulum
+from keras_pendulum.environments.task import Task
 from keras_pendulum.environments.tasks import TASKS
+from keras_pendulum.optimum.known_dynamics import KnownDynamics
 from keras_pendulum.optimum.solutions import SOLUTIONS, solution
 
 
@@ -55,3 +57,22 @@ def test_mean_best_return_is_that_of_episodes_of_the_given_length(
 ) -> None:
     value = solution(kp.preset(preset).task).mean_best_return(steps)
     assert value == pytest.approx(optimum, abs=0.3 if steps == 200 else 0.01, nan_ok=True)
+
+
+@pytest.mark.parametrize("task", [Pendulum(), CartPole()])
+def test_outcomes_of_a_lasting_action_are_those_of_its_steps(task: Task) -> None:
+    exact = solution(task)
+    assert isinstance(exact, KnownDynamics)
+    states, efforts = 2 * np.array(task.starts(range(20))), np.array([-2.0, 1.0])
+    outcomes = exact.lasting_outcomes(states, efforts, 30)
+    assert task.never_terminates or 0 < outcomes.terminated.sum() < 40
+    for row, column in np.ndindex(20, 2):
+        rewards: list[float] = []
+        state, ended = states[[row]], False
+        while len(rewards) < 30 and not ended:
+            step = exact.outcomes(state, efforts[[column]])
+            state, ended = step.state[:, 0], bool(step.terminated[0, 0])
+            rewards.append(float(step.reward[0, 0]))
+        assert outcomes.reward[row, column] == pytest.approx(sum(rewards))
+        assert outcomes.state[row, column] == pytest.approx(state[0])
+        assert outcomes.terminated[row, column] == ended
