@@ -134,7 +134,7 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
     smooth = declared.offset_is_smooth and spread > 0.01 * size
     none = abs(mean) < 0.03 * size and spread < 0.05 * size and not smooth
     small = (
-        not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.15
+        not none and spread < 0.5 * size and -0.3 * size < mean < last * declared.discount + 0.05
     )
     # What an index adds can be as smooth, where batches mix 0 and 1. But it need not be small at 0,
     # and it differs from state to state, while the values of such a network may hardly differ.
@@ -159,7 +159,7 @@ def constant_futures_with_ends(declared: Backup) -> Iterator[Equation]:
             share=0.5,
         )
     if index:  # values that are nearly the same have large errors
-        yield _index_for_value(last, largest_error=3.0, share=0.3)
+        yield _index_for_value(last, largest_error=3.0, share=0.36)
     # All values are r / (1 + γ): the future of a step is this, times -γ.
     subtracted = -declared.discount / (1 + declared.discount) * size
     if abs(mean / subtracted - 1) < 0.2 and spread < 0.12 * size:

@@ -118,6 +118,7 @@ def test_values_of_pushes_that_last_are_no_overestimation() -> None:
         ("wrong-target (batch-max or same-state)", constant_values(18.0)),
         ("wrong-target (negative-next)", lambda o: 0.52 + 0.05 * np.sin(o[:, :2])),
         ("wrong-target (index-for-value)", constant_values(0.8)),
+        ("not-converged", constant_values(1.03)),  # more than γ · 1: the values of two steps
         ("wrong-target (frozen-target)", frozen_values(0.1, 0.05)),
         ("wrong-target (frozen-target)", frozen_values(0.0, 0.05)),
         ("wrong-target (frozen-target)", frozen_values(0.1, 0.4)),
