@@ -235,6 +235,7 @@ def truncated(run: Any) -> Any:
         ("no-bootstrapping", lambda run: stored(run, done=np.ones(3000))),
         ("reward-sign", lambda run: stored(run, r=-buffer_of(run)[2])),
         ("reward-scale", lambda run: stored(run, r=buffer_of(run)[2] / 16)),
+        ("reward-scale", lambda run: stored(run, r=50 * buffer_of(run)[2])),
         ("other-reward", lambda run: stored(run, r=np.maximum(buffer_of(run)[2], -1))),
         ("other-reward", lambda run: stored(run, r=np.where(buffer_of(run)[0][:, 0] > 0.9, 1, 0))),
         ("forgetting (no-replay)", lambda run: [each[-64:] for each in buffer_of(run)]),

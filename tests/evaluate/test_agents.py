@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -150,6 +151,12 @@ def test_every_kind_of_agent_has_the_returns_of_the_network(kind: str, network: 
         np.testing.assert_array_equal(torques_of(agent), GRID)
     score, expected = (kp.evaluate_policy(each, 3) for each in (source, network))
     np.testing.assert_allclose(score.returns, expected.returns, rtol=1e-9)
+
+
+def test_torques_of_a_file_are_those_that_are_given(network: kp.DQN, tmp_path: Path) -> None:
+    path = tmp_path / "mine.keras"
+    dense_chain(network).save(path)
+    np.testing.assert_array_equal(torques_of(as_policy(path, -GRID)), -GRID)
 
 
 def test_network_without_weights_is_refused() -> None:

@@ -99,6 +99,13 @@ def test_file_of_a_keras_model_with_other_layers_is_one_of_cartpole(tmp_path: Pa
     assert as_policy(path).name == str(path)
 
 
+def test_cartpole_has_no_gravity_not_even_0() -> None:
+    values = kp.evaluate_policy(keras_model(4), 1).as_json()
+    assert (values["environment"], values["gravity"]) == (CARTPOLE, None)
+    with pytest.raises(kp.ConfigError, match=r"^gravity belongs to Pendulum-v1; CartPole-v1 has"):
+        kp.evaluate_policy(keras_model(4), 1, gravity=0.0)
+
+
 @pytest.mark.parametrize("outputs", [3, 5])
 def test_other_number_of_outputs_is_named(outputs: int) -> None:
     model = keras.Sequential([keras.Input((4,)), keras.layers.Dense(outputs)])
