@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import keras_pendulum as kp
+from keras_pendulum.optimum import discounted
 from keras_pendulum.optimum import episode_values as module
 from keras_pendulum.optimum.cartpole_values import cartpole_value
 from keras_pendulum.optimum.discounted import discounted_value
@@ -76,6 +77,7 @@ def test_table_is_computed_once_and_read_from_the_cache(
         ("pendulum", lambda arrays: {"value": -arrays["value"]}),
         ("pendulum", lambda arrays: {"value": arrays["value"].astype(np.float64)}),
         ("pendulum", lambda arrays: {"value": np.full_like(arrays["value"], np.nan)}),
+        ("pendulum", lambda arrays: {"gravity": np.array(2.0)}),
         ("episode", lambda arrays: {"high": arrays["high"][:-1]}),
         ("episode", lambda arrays: {"low": arrays["low"].astype(np.float32)}),
         ("episode", lambda arrays: {"scale": None}),
@@ -98,6 +100,21 @@ def test_table_that_cannot_be_right_is_computed_again(
     for _ in range(2):
         require_equal(name, table(), right)
     assert len(caplog.records) == 2
+
+
+def test_table_is_that_of_its_gravity_and_discount(
+    optimum_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solved = []
+
+    def solve(gravity: float, discount: float, cells: int) -> Any:
+        solved.append((gravity, discount))
+        return np.full((cells, 800), -gravity, np.float32)
+
+    monkeypatch.setattr(discounted, "solve_discounted", solve)
+    for gravity, discount in (2.0, 0.3), (3.0, 0.3), (3.0, 0.4):
+        assert discounted_value(gravity, discount)[0, 0] == -gravity
+    assert solved == [(2.0, 0.3), (3.0, 0.3), (3.0, 0.4)]
 
 
 @pytest.mark.parametrize(
