@@ -1,4 +1,4 @@
-"""What the stored transitions of a run show: their rewards, and mistakes of their states."""
+"""The findings of stored transitions: their rewards, and mistakes of their states."""
 
 from __future__ import annotations
 

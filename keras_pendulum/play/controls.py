@@ -1,4 +1,4 @@
-"""What the keys do in each task of the game."""
+"""The keys of each task of the game, and their efforts."""
 
 from __future__ import annotations
 
