@@ -8,8 +8,8 @@ command continues after a stop, with the first one that is not finished, and rep
 failed. To begin anew, remove the folder runs/benchmarks. It takes ten hours on two cores; nothing
 else should run there, because some commands measure time.
 
-A command whose packages are missing is left out, with one line. PYTHON runs the other libraries; it
-belongs to an environment with the extra `bench`, by default to the one of this package.
+A command whose packages are missing is left out, with one line. PYTHON runs the other libraries, by
+default the one of this package.
 """
 
 from __future__ import annotations

@@ -55,8 +55,8 @@ COMMANDS = (
     Command("learning.training_curves", 3, results=("training_curves",)),
     Command(
         "learning.example_programs",
-        10,
-        ("2", PYTHON),
+        3,
+        ("2",),
         ("example_programs",),
         ("psutil", "stable_baselines3"),
     ),

@@ -21,7 +21,6 @@ from keras_pendulum.errors import did_you_mean
 from keras_pendulum.storage.shipped_weights import shipped_returns
 from keras_pendulum.version import __version__
 
-# `optimum` is not listed: it writes files of the package itself.
 COMMANDS = {
     "train": "train a DQN, and evaluate it",
     "evaluate": "evaluate a policy, and compare it with the best possible return",

@@ -143,7 +143,7 @@ def _numbers(text: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError as error:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no list of numbers such as -2,0,2"
+            f"{text!r} is not a list of numbers such as -2,0,2"
         ) from error
 
 

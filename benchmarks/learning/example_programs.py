@@ -1,10 +1,10 @@
 """Whole runs of examples/my_dqn.py, on both tasks, and of examples/sb3_dqn.py.
 
-    python -m benchmarks.learning.example_programs [RUNS [PYTHON]]
+    python -m benchmarks.learning.example_programs [RUNS]
 
 Runs the programs as they are, with the seeds 0, 1, … (2 of them), and takes from what they print
-the regret and whether `diagnose` finds something. Each run is a process. PYTHON runs the program of
-Stable-Baselines3, if it has that library. It takes ten minutes.
+the regret and whether `diagnose` finds something. Each run is a process. The program of
+Stable-Baselines3 is left out if that library is missing. It takes three minutes.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ def program_text(name: str, seed: int) -> str:
     return text
 
 
-def measured(name: str, runs: int, python: str) -> Row:
+def measured(name: str, runs: int) -> Row:
     """Returns the row of a program."""
     processes = []
     for seed in range(runs):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "program.py"
             path.write_text(program_text(name, seed), encoding="utf-8")
-            processes.append(run_process(str(path), python=python))
+            processes.append(run_process(str(path)))
         print(f"{name}, seed {seed}: {processes[-1].seconds:.0f} s", flush=True)
     outputs = [each.output for each in processes]
     healthy = sum("\nNo finding" in each for each in outputs)
@@ -62,15 +62,12 @@ def measured(name: str, runs: int, python: str) -> Row:
     }
 
 
-def main(runs: str = "2", python: str = sys.executable) -> None:
+def main(runs: str = "2") -> None:
     """Makes the runs and writes the table."""
-    installed = run_process("-m", "benchmarks.learning.other_libraries", python=python)
-    libraries = installed.output.splitlines()
+    libraries = run_process("-m", "benchmarks.learning.other_libraries").output.splitlines()
     has_sb3 = any(each.startswith("stable-baselines3 ") for each in libraries)
     names = [name for name in PROGRAMS if name != "sb3_dqn.py" or has_sb3]
-    rows = [
-        measured(name, int(runs), python if "sb3" in name else sys.executable) for name in names
-    ]
+    rows = [measured(name, int(runs)) for name in names]
     command = f"python -m benchmarks.learning.example_programs {runs}"
     write("example_programs", command, rows, also=libraries)
 

@@ -11,9 +11,10 @@ process until its final weights are saved, and until its end. This package runs 
 only train. The last column counts the training seeds with which a library ends nearer to the
 optimum than this package. `reference` takes a quarter of an hour, `swingup` half an hour.
 
-PYTHON runs the other libraries; it belongs to an environment with the extra `bench`, by default to
-the one of this package. Keras imports JAX if it is installed, so a separate environment is fairer
-to this package. A library that is not installed is left out.
+PYTHON runs the other libraries, by default the one of this package. Keras imports JAX and
+Stable-Baselines3 imports TensorFlow if they are installed, so another environment, with nothing but
+Gymnasium and the packages of the extra `bench`, is fairer. A library that is not installed is left
+out.
 """
 
 from __future__ import annotations

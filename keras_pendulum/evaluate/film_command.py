@@ -58,8 +58,8 @@ def parse_start(text: str) -> float:
         angle = math.nan
     if not -180 <= angle <= 180:  # written so that NaN fails too
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no start: expected hanging, upright, or an angle from -180 to 180 (°, 0 "
-            "is upright)"
+            f"{text!r} is not a start: expected hanging, upright, or an angle from -180 to 180 "
+            "(°, 0 is upright)"
         )
     return angle
 

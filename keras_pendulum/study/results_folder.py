@@ -206,7 +206,7 @@ class ResultsFolder:
             job = self._job(arm, int(seed)) if arm and is_number else None
             if job is None or self._file(job) != file or self._read(job) is None:
                 raise UserError(
-                    f"{file} is no result of this study, and study.json is missing: run the "
+                    f"{file} is not a result of this study, and study.json is missing: run the "
                     "command that made the results, with its presets and arms, or name another "
                     "folder with --out"
                 )

@@ -243,7 +243,7 @@ WRONG = [
     (["evaluate", "reference", "--gif", "film.mp4"], "expected a name that ends in .gif"),
     (["evaluate", "reference", "--video", "film.avi"], "expected a name that ends in .mp4"),
     (["evaluate", "reference", "--start", "hanging"], "--start is the start of a film"),
-    (["evaluate", "reference", "--gif", "a.gif", "--start", "181"], "'181' is no start"),
+    (["evaluate", "reference", "--gif", "a.gif", "--start", "181"], "'181' is not a start"),
 ]
 
 

@@ -81,7 +81,7 @@ def test_figure_is_drawn_without_q_values_too() -> None:
         (["nothing.h5"], "error: nothing.h5: no such file"),
         (["{weights}", "--gravity", "-1"], "error: gravity is -1"),
         (["{weights}", "--discount", "2"], "error: discount is 2"),
-        (["{weights}", "--torques=a"], "error: argument --torques: 'a' is no list of numbers"),
+        (["{weights}", "--torques=a"], "error: argument --torques: 'a' is not a list of numbers"),
         (["{weights}", "--torques=-1,1"], "error: torques has 2 numbers"),
         (["{folder}"], "error: {folder}: holds no run (no pendulum_weight.h5"),
         (["{folder}/agents.py:Trainer"], "error: {folder}/agents.py:Trainer: agent is the class "),

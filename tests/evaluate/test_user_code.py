@@ -74,7 +74,7 @@ WRONG = [
     (["bad.py:push"], "bad.py: raised ZeroDivisionError: division by zero (bad.py, line 2)"),
     (["syntax.py:push"], "syntax.py: raised SyntaxError"),
     (["my agent.py:push", "--torques=1,2"], "a number of the type float64; expected an integer"),
-    (["my agent.py:push", "--torques=1,x"], "'1,x' is no list of numbers such as -2,0,2"),
+    (["my agent.py:push", "--torques=1,x"], "'1,x' is not a list of numbers such as -2,0,2"),
     (["my agent.py:push", "--activation", "relu"], "--activation belongs to a weights file"),
     (["reference", "--discount", "2"], "discount is 2.0; expected a number from 0 to 1"),
 ]

@@ -164,7 +164,7 @@ def test_results_without_manifest_are_refused_by_name_in_another_study(
     before = {file: file.read_bytes() for file in tmp_path.rglob("*.*")}
     with pytest.raises(UserError) as caught, folder.create_and_lock():
         pass
-    assert f"{first} is no result of this study, and study.json is missing: run" in str(
+    assert f"{first} is not a result of this study, and study.json is missing: run" in str(
         caught.value
     )
     assert {file: file.read_bytes() for file in tmp_path.rglob("*.*")} == before
