@@ -138,7 +138,7 @@ def main(argv: Sequence[str] | None = None, *, work: Path = WORK, run: Run = run
         "--only", nargs="+", default=[], metavar="NAME", help="run these, also finished ones"
     )
     parser.add_argument(
-        "--python", default=sys.executable, help="runs the other libraries (extra `bench`)"
+        "--python", default=sys.executable, help="runs the other libraries (extra `peers`)"
     )
     arguments = parser.parse_args(argv)
     chosen = chosen_commands(arguments.only)

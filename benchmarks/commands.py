@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 FOLDER = "FOLDER"  # an argument: the folder for networks that a later run of the command uses again
 PYTHON = "PYTHON"  # an argument: the Python that runs the other libraries
-_BENCH = {"stable_baselines3", "sbx"}  # packages of the extra `bench` that `test` does not have
+_EXTRAS = {"stable_baselines3": "bench", "sbx": "peers"}  # package: its extra, where not `test`
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,8 @@ class Command:
     @property
     def extra(self) -> str:
         """The extra with its packages; empty if it needs none."""
-        return "bench" if _BENCH & {*self.packages} else "test" if self.packages else ""
+        extras = [_EXTRAS.get(package, "test") for package in self.packages]
+        return max(extras, key=["test", "bench", "peers"].index, default="")
 
 
 COMMANDS = (

@@ -3,10 +3,10 @@
     python -m benchmarks.learning.cartpole_beside_pytorch [SEEDS]
 
 Trains the preset `cartpole-original` and the notebooks' program (tests/torch/torch_cartpole.py,
-extra `bench`) for 150 episodes with the seeds 0, 1, … (5 seeds). Each run is a process, and the
+extra `test`) for 150 episodes with the seeds 0, 1, … (5 seeds). Each run is a process, and the
 programs run in turns. The speed is that of the training loop without its first 20 episodes, in
-which the update is compiled. The learning curves are mean returns of 30 episodes each. It takes
-three minutes.
+which the update is compiled. The learning curves are mean returns of 30 episodes each. It takes a
+minute.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
     python -m benchmarks.learning.other_libraries sb3|sbx PRESET SEED OUT.npz
 
 Trains a DQN of Stable-Baselines3 (PyTorch) or of sbx (JAX) and writes the network's weights to
-OUT.npz, in Keras's order. Needs the extra `bench`. PRESET is `reference` or `swingup`. The settings
+OUT.npz, in Keras's order. Needs the extra `peers`. PRESET is `reference` or `swingup`. The settings
 are those of the preset, except where the libraries differ: both use the Huber loss of the taken
 action and their own initial weights. Neither averages its weights, as `swingup` does
 (`average_updates`). Both count the period of the target update in steps, so they make their

@@ -13,7 +13,7 @@ optimum than this package. `reference` takes a quarter of an hour, `swingup` hal
 
 PYTHON runs the other libraries, by default the one of this package. Keras imports JAX and
 Stable-Baselines3 imports TensorFlow if they are installed, so another environment, with nothing but
-Gymnasium and the packages of the extra `bench`, is fairer. A library that is not installed is left
+Gymnasium and the packages of the extra `peers`, is fairer. A library that is not installed is left
 out.
 """
 

@@ -103,9 +103,10 @@ def test_command_without_its_packages_is_left_out_with_one_line(
     assert runs.names == modules([each for each in COMMANDS if each not in left_out])
     lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("left out")]
     assert lines == [
-        f"left out: {each.line}: not installed: stable_baselines3 (extra `bench`)"
+        f"left out: {each.line}: not installed: stable_baselines3 (extra `{each.extra}`)"
         for each in left_out
     ]
+    assert {each.extra for each in left_out} == {"bench", "peers"}
 
 
 def test_missing_packages_are_found() -> None:
