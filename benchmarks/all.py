@@ -5,7 +5,7 @@
 Runs the commands of `benchmarks.commands` in their order; `--list` prints them with their minutes.
 After each command it notes in runs/benchmarks/finished.json that this one has finished. So the same
 command continues after a stop, with the first one that is not finished, and repeats those that have
-failed. To begin anew, remove the folder runs/benchmarks. It takes ten hours on two cores; nothing
+failed. To begin anew, remove the folder runs/benchmarks. It takes eight hours on two cores; nothing
 else should run there, because some commands measure time.
 
 A command whose packages are missing is left out, with one line. PYTHON runs the other libraries, by

@@ -3,7 +3,7 @@
     python -m benchmarks.files.keras_files
 
 Prints a table: how many files load with the same Q-values, how many are refused, and how many break
-the rule of their network. Ends with exit status 1 when one does. Needs the extra `test`; ten
+the rule of their network. Ends with exit status 1 when one does. Needs the extra `test`; three
 minutes.
 """
 

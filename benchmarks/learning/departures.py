@@ -8,7 +8,7 @@ runs at a time. Writes the greedy regrets on the starts of seeds 0 to 99, of Car
 to 999, with their interquartile mean. The command may be stopped and started again: the regrets in
 FOLDER/regrets.jsonl are used again. After a change of a preset, it trains only the rows whose
 settings are others; after a change of the training, remove the file. On two cores, `cartpole` takes
-20 minutes and `swingup` an hour and a half.
+half an hour and `swingup` an hour and a half.
 `reference` departs from `original`: its rows are arms of the study, so
 `benchmarks.learning.study` trains them.
 """

@@ -5,7 +5,7 @@
 Trains arms with the training seeds 100, 101, … (8 seeds), two runs at a time, and evaluates each
 run greedily on the starts of seeds 1000 to 1299. Arms are written as for the study; the default
 ones are those of docs/presets.md. The regrets in FOLDER/regrets.jsonl are used again: remove the
-file after a change of the training. The command takes seven minutes on two cores.
+file after a change of the training. The command takes eight minutes on two cores.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     python -m benchmarks.pages.fault_pictures FOLDER
 
 Trains the networks in FOLDER, as `benchmarks.diagnosis.single_faults` does, and writes
-docs/faults/FAULT.png. It takes minutes.
+docs/faults/FAULT.png. It takes a minute.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 Executes all cells in an empty folder and stores their outputs, with pictures of few colours and
 without the times of the execution. Then it writes docs/step_by_step.md: the same cells with their
-outputs. It takes some minutes.
+outputs. It takes a minute.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 Makes a virtual environment for each extra (none, `study` and `test` by default), installs the
 package in it as docs/install.md says, and deletes it again. The minutes include the download, so
-they depend on the connection. It takes ten minutes.
+they depend on the connection. It takes three minutes.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 Makes the same RUNS (4) runs of `reference` on one worker and on two, as whole studies without the
 command: results are written and read as for a user. The workers have made a run before. Both take
 turns, ROUNDS (5) times, because a shared machine is faster in one minute than in another; the table
-has the medians. With 500 episodes that takes eight minutes on two cores. For comparison, two
+has the medians. With 500 episodes that takes twelve minutes on two cores. For comparison, two
 processes multiply matrices of the size of an update: no study can be more efficient than that.
 """
 

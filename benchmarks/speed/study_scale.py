@@ -5,7 +5,7 @@
 An empty run trains nothing and returns a result as large as a real one. RUNS (8000, over 10 arms)
 are handed out to WORKERS (8) worker processes of this machine, first without writing the results,
 then with (one file each, flushed to the disk). Then the folder is searched for missing runs, and
-the table and the figure are made. Three minutes on two cores.
+the table and the figure are made. One minute on two cores.
 """
 
 from __future__ import annotations
