@@ -122,7 +122,7 @@ def train(steps=STEPS, seed=0):
             if updates % COPY_EVERY == 0:
                 target.set_weights(online.get_weights())  # [20]
         if (step + 1) % (steps // 10) == 0:
-            mean = np.mean(returns[-11:-1])  # of 10 whole episodes
+            mean = np.mean(returns[-11:-1] or returns)  # of 10 whole episodes, if there are any
             print(f"step {step + 1}: mean return {mean:.0f}, epsilon {epsilon:.2f}", flush=True)
     return online, buffer, env
 
