@@ -6,7 +6,7 @@ Loads COUNT [2500] files of each of four layouts, damaged at random by tests/sto
 and the files of tests/storage/hostile_files.py. Each load runs in another process. `loaded, other`
 counts networks with other numbers: most layouts have no checksum. Ends with exit status 1 when a
 load crashed, took more than ten seconds, or raised another error than one line of WeightsError.
-Needs the extra `test`; 45 minutes.
+Needs the extra `test`; half an hour.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@
 Runs them in an empty folder. Writes what they print to benchmarks/results, and their pictures to
 docs/: run.png, cartpole.png, diagnose.png, compare.png and the film swingup.gif. The shipped policy
 `reference` is the run of the first line in README.md, made by `benchmarks.learning.preset_results`;
-run that first. It takes two minutes on two cores.
+run that first. It takes a minute on two cores.
 """
 
 from __future__ import annotations
