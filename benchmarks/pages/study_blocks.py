@@ -113,7 +113,7 @@ def _hours(hours: float) -> str:
 def study_scale() -> str:
     """Returns the limits of a study, measured with empty runs."""
     (row,) = rows_of("study_scale")
-    run = rows_of("study_cost")[1]["training (s per run)"]
+    run = 3600 / rows_of("study_cost")[1]["runs per core-hour"]  # s of a core
     answered, written = row["answered (runs/s)"], row["answered and written (runs/s)"]
     lines = (
         f"**Scheduler and study** are the first limit. They hand out {answered} empty runs per "

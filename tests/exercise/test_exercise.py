@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,15 @@ def test_example_imports_this_package_for_its_test_only() -> None:
     }
     assert imported == {"time", "gymnasium", "keras", "numpy", "tensorflow", "keras_pendulum"}
     assert ".predict(" not in HEALTHY
+
+
+def test_example_without_a_whole_episode_prints_the_mean_of_what_it_has(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runpy.run_path(str(ROOT / "examples" / "my_dqn.py"))["train"](steps=20)
+    means = re.findall(r"mean return (\S+),", capsys.readouterr().out)
+    assert len(means) == 10
+    assert all(float(mean) < 0 for mean in means)
 
 
 def test_every_number_of_the_example_is_explained() -> None:
